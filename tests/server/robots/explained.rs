@@ -2,12 +2,12 @@
 
 use std::future::pending;
 
-use sublevel::client::{ExplainQuestion, ExplainedState, SubmitError};
+use sublevel::client::{ExplainQuestion, ExplainedState, RobotPlacement, SubmitError};
 use sublevel::robot::motion::PairClass;
 use sublevel::scene::query::{Certainty, StateVerdict};
-use sublevel::store::DeriveRequest;
+use sublevel::store::{DeriveRequest, DerivedLinkPair, RobotSource};
 
-use super::{at, cell, served};
+use super::{SRDF, URDF, at, cell, served};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn contacts_are_explained_and_freed() {
@@ -83,6 +83,7 @@ async fn pairs_of_links_are_derived_by_a_job() {
     let found = client.derive_allowed_pairs(&near, |_| {}, pending()).await.expect("derived");
     let pair = found.pairs.iter().find(|pair| pair.links == ["post", "hand"]).expect("a pair");
     assert!(matches!(pair.class, PairClass::Collides | PairClass::Always), "{pair:?}");
+    assert!(pair.contradicts_srdf(), "{pair:?}");
     for (bad, field) in [
         (DeriveRequest { margin_m: f64::INFINITY, ..asked }, "margin_m"),
         (DeriveRequest { max_boxes: 0, ..asked }, "max_boxes"),
@@ -100,4 +101,46 @@ async fn pairs_of_links_are_derived_by_a_job() {
     let cancelled = client.derive_allowed_pairs(&long, |_| {}, std::future::ready(())).await;
     let took = begun.elapsed();
     assert!(matches!(cancelled, Err(SubmitError::Cancelled)) || took.as_secs() < 5, "{cancelled:?} {took:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_an_srdf_leaves_out_wrongly_is_found_with_a_witness() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    // The post is 1.8 m high, and the arm may swing its hand into it; of the finger and the arm the
+    // SRDF says that they touch in the default state.
+    let tall = URDF.replace("0.2 0.2 0.4", "0.2 0.2 1.8");
+    let tall = tall.replace("lower=\"-2\" upper=\"2\"", "lower=\"-3.1\" upper=\"3.1\"");
+    let default = "<disable_collisions link1=\"arm\" link2=\"finger\" reason=\"Default\"/></robot>";
+    let hand = robot.links.iter().find(|link| &*link.name == "hand").and_then(|link| link.body).expect("a body");
+    let bodies = [("hand".into(), hand)].into();
+    let source = RobotSource { urdf: tall, srdf: SRDF.replace("</robot>", default), bodies };
+    let robot = client.load_robot(&source).await.expect("loaded");
+    let asked = DeriveRequest { robot: robot.id, margin_m: 0.0, max_boxes: 20_000, resolution_m: 1e-3 };
+    let found = client.derive_allowed_pairs(&asked, |_| {}, pending()).await.expect("derived");
+    let wrong: Vec<&DerivedLinkPair> = found.pairs.iter().filter(|pair| pair.contradicts_srdf()).collect();
+    let [wrong] = &wrong[..] else { panic!("{:?}", found.pairs) };
+    assert_eq!((&wrong.links, wrong.class), (&["post".to_owned(), "hand".to_owned()], PairClass::Collides));
+    // How well the ball follows what the hand would be is not known.
+    assert!(!wrong.is_certain && !wrong.is_proven() && wrong.srdf_reason.as_deref() == Some("Never"), "{wrong:?}");
+    let right = found.pairs.iter().find(|pair| pair.srdf_reason.as_deref() == Some("Default")).expect("a pair");
+    assert!(right.class == PairClass::Never && right.is_proven() && right.witness.is_none(), "{right:?}");
+    // The finger can touch the post as well, which the SRDF does not leave out.
+    let checked = found.pairs.iter().find(|pair| pair.links == ["post", "finger"]).expect("a pair");
+    assert!(checked.class == PairClass::Collides && checked.srdf_reason.is_none(), "{checked:?}");
+
+    // At the witness they are in contact by as much, which is said only where allowed pairs count.
+    client.create_scene("tall").await.expect("made");
+    client.place_robot("tall", &RobotPlacement::new("one", &robot)).await.expect("placed");
+    let witness = wrong.witness.clone().expect("joint values");
+    let ask = || ExplainQuestion::of_robot("one", []).with_joint_values(&witness);
+    let names = ["one/post", "one/hand"].map(str::to_owned);
+    let silent = client.explain("tall", ask()).await.expect("answered");
+    assert!(silent.pairs.iter().all(|pair| pair.pair != names), "{silent:?}");
+    let mut all = ask();
+    all.request_mut().include_allowed = true;
+    let found = client.explain("tall", all).await.expect("answered");
+    let pair = found.pairs.iter().find(|pair| pair.pair == names).expect("the pair");
+    let upper = wrong.upper_m.expect("a depth");
+    assert!(pair.is_contact && pair.lower_m <= upper + 1e-9 && pair.upper_m < 0.99 * upper, "{pair:?} {upper}");
 }

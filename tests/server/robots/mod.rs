@@ -1,10 +1,14 @@
 //! Robots: loaded, placed in scenes, asked about, kept.
 
 mod clearances;
+#[cfg(feature = "fit")]
+mod command;
 mod explained;
 mod kept;
 mod meshes;
 mod motions;
+#[cfg(feature = "fit")]
+mod panda;
 mod pictures;
 mod questions;
 mod refused;
