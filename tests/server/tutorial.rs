@@ -2,7 +2,9 @@
 //! and it plans.
 
 use std::path::Path;
+use std::process::{Command, Stdio};
 
+use sublevel::client::{ClearanceQuestion, Client};
 use sublevel_testkit::data;
 
 use crate::harness::Running;
@@ -75,8 +77,15 @@ fn the_tutorial_shows_the_example() {
     assert!(lines(blocks[0]).len() < 20, "the planner of the tutorial is no longer short");
 }
 
+/// Where a test finds the arguments of the example, a line each, when it runs as the example.
+const ARGUMENTS: &str = "SUBLEVEL_TUTORIAL";
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_planner_of_the_tutorial_plans() {
+    if let Ok(arguments) = std::env::var(ARGUMENTS) {
+        let [url, urdf, srdf] = arguments.lines().collect::<Vec<_>>()[..] else { panic!("{arguments}") };
+        return robot::run(url, urdf.as_ref(), srdf.as_ref()).await.expect("it runs");
+    }
     let dir = tempfile::tempdir().expect("a directory");
     let server = Running::start(dir.path());
     let [urdf, srdf] = ["arm.urdf", "arm.srdf"].map(|name| dir.path().join(name));
@@ -94,11 +103,40 @@ async fn the_planner_of_the_tutorial_plans_with_a_panda() {
     plans(&server.url(), &data("panda/panda.urdf"), &data("panda/panda.srdf")).await;
 }
 
-/// The example runs, and its planner takes a path over the wall and refuses the one through it.
+/// What the example prints, in a process of its own.
+fn printed(url: &str, urdf: &Path, srdf: &Path) -> String {
+    let mut example = Command::new(std::env::current_exe().expect("this program"));
+    example.args(["tutorial::the_planner_of_the_tutorial_plans", "--exact", "--nocapture"]);
+    example.env(ARGUMENTS, format!("{url}\n{}\n{}", urdf.display(), srdf.display()));
+    let done = example.stdin(Stdio::null()).output().expect("it runs");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    String::from_utf8(done.stdout).expect("text")
+}
+
+/// The example runs and prints the closest links, and its planner takes a path over the wall and
+/// refuses the one through it.
 async fn plans(url: &str, urdf: &Path, srdf: &Path) {
-    robot::run(url, urdf, srdf).await.expect("it runs");
+    let text = printed(url, urdf, srdf);
     let over = robot::plan(url, (urdf, srdf), "over", &robot::PATH).await.expect("planned");
     let through = [robot::PATH[0], robot::PATH[3]];
     let through = robot::plan(url, (urdf, srdf), "through", &through).await.expect("planned");
     assert!(over && !through, "{over} {through}");
+    // For each of the four configurations the link that is nearest to the wall.
+    let lines: Vec<&str> = text.lines().collect();
+    let question = ClearanceQuestion::of_robot("arm", [], 2.0).with_configurations(&robot::PATH);
+    let client = Client::connect(url).await.expect("the server answers");
+    let near = client.clearance("over", question).await.expect("answered");
+    let expected = near.states.iter().map(|state| {
+        let pair = state.closest_to("wall").expect("the wall is near");
+        assert!(pair.lower_m > 0.0 && pair.pair[0].starts_with("arm/") && pair.pair[1] == "wall", "{pair:?}");
+        format!("{} and wall are {:.4} m apart", pair.pair[0], pair.lower_m)
+    });
+    let expected: Vec<_> = expected.collect();
+    let apart: Vec<&str> = lines.iter().copied().filter(|line| line.ends_with(" m apart")).collect();
+    assert_eq!((apart, expected.len()), (expected.iter().map(String::as_str).collect(), 4), "{text}");
+    for line in ["states [Free, Free, Free, Free], edges [Free, Free, Free]", "the path is proven free"] {
+        assert!(lines.contains(&line), "{line}: {text}");
+    }
+    let begins = ["the certificate holds, with 0.", "straight on: Contact, free up to 0.", "halfway arm/"];
+    assert!(begins.iter().all(|begin| lines.iter().any(|line| line.starts_with(begin))), "{text}");
 }

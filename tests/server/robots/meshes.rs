@@ -1,6 +1,6 @@
 //! Links whose meshes are sent along, and robots of many kinds.
 
-use sublevel::client::{RobotPlacement, StatesQuestion};
+use sublevel::client::{CertificateQuestion, ClearanceQuestion, MotionsQuestion, RobotPlacement, StatesQuestion};
 use sublevel::scene::NamedJointValues;
 use sublevel::scene::query::StateVerdict;
 use sublevel::service::proto::fit_mesh::Content;
@@ -142,6 +142,12 @@ fn baxter() -> String {
     )
 }
 
+/// A unit quaternion of a small turn about a direction that is no axis.
+fn turned() -> [f64; 4] {
+    let turn = nalgebra::UnitQuaternion::from_scaled_axis(nalgebra::Vector3::new(0.1, -0.05, 0.2));
+    turn.coords.into()
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn robots_of_many_kinds_are_loaded_placed_and_checked() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -151,16 +157,19 @@ async fn robots_of_many_kinds_are_loaded_placed_and_checked() {
     let names = ["base", "shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"];
     let folded = |width: usize| vec![0.0; width];
     let floating = vec![0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+    // Each with a configuration, one that it gets to without contact, and a place in it.
+    let driven = vec![0.1, -0.1, 0.2, 0.05, 0.3, -1.0, 0.02];
+    let flown = [&[0.05, -0.05, 0.1][..], &turned(), &[0.2, -0.3, 0.1, 0.3]].concat();
     let robots = [
         // The arm stands upright: its wrist is 1.2 m up.
-        (ur5(), names.map(dae).to_vec(), 6, folded(6), at(0.03, 0.03, 1.23)),
-        (FETCH.to_owned(), vec![mesh("torso.stl", MeshFormat::Stl, &stl())], 7, folded(7), at(0.7, 0.0, 0.7)),
-        (baxter(), Vec::new(), 11, floating, at(0.55, 0.3, 0.4)),
+        (ur5(), names.map(dae).to_vec(), folded(6), vec![0.3, 0.1, -0.2, 0.1, 0.4, 0.1], at(0.03, 0.03, 1.23)),
+        (FETCH.to_owned(), vec![mesh("torso.stl", MeshFormat::Stl, &stl())], folded(7), driven, at(0.7, 0.0, 0.7)),
+        (baxter(), Vec::new(), floating, flown, at(0.55, 0.3, 0.4)),
     ];
-    for (index, (urdf, meshes, width, configuration, place)) in robots.into_iter().enumerate() {
+    for (index, (urdf, meshes, configuration, goal, place)) in robots.into_iter().enumerate() {
         let robot = client.load_robot_with(load(&urdf, "", meshes)).await.expect("loaded");
         let given: usize = robot.joints.iter().map(|joint| joint.kind.width()).sum();
-        assert_eq!(given, width, "{}", robot.name);
+        assert_eq!((given, given), (configuration.len(), goal.len()), "{}", robot.name);
         let scene = format!("cell {index}");
         client.create_scene(&scene).await.expect("made");
         let base = at(0.0, 0.0, 0.0);
@@ -170,8 +179,37 @@ async fn robots_of_many_kinds_are_loaded_placed_and_checked() {
         let ask = || StatesQuestion::of_robot("robot", []).with_joint_values(&configuration);
         let alone = client.check_states(&scene, ask()).await.expect("answered");
         assert_eq!(alone.verdicts, [StateVerdict::Free], "{}: {:?}", robot.name, alone.pairs);
+        // Beside a ball that is 0.4 m above that place it moves freely, which is proven, and keeps
+        // no farther from everything than the pairs at both ends of the way do.
+        let above = *place.translation() + nalgebra::Vector3::new(0.0, 0.0, 0.4);
+        client.put_objects(&scene, [("ball", &ball, place.with_translation(above))]).await.expect("placed");
+        let edge = [configuration.clone(), goal];
+        let question = || MotionsQuestion::of_robot("robot", []).with_edges(&edge);
+        let found = client.check_motions(&scene, question().with_certificates()).await.expect("answered");
+        assert!(found.are_free() && found.complete, "{}: {found:?}", robot.name);
+        let clearance = ClearanceQuestion::of_robot("robot", [], 0.5).with_configurations(&edge);
+        let near = client.clearance(&scene, clearance).await.expect("answered");
+        for state in &near.states {
+            let row = state.closest_to("ball").expect("the ball is near");
+            assert!(state.checked && row.lower_m > 0.05 && row.upper_m < 0.5, "{}: {row:?}", robot.name);
+            let gradient = row.joint_gradient.as_ref().expect("a gradient");
+            assert!(gradient.len() == given && gradient.iter().any(|slope| slope.abs() > 1e-3), "{row:?}");
+            let closest = state.closest().expect("a pair");
+            assert!(found.motions[0].clearance_lower_m <= closest.upper_m + 1e-9, "{}: {closest:?}", robot.name);
+        }
+        let certificate = found.motions[0].certificate.clone().expect("a certificate");
+        let certificate = || CertificateQuestion::new(certificate.clone());
+        let alone = client.verify_motion(certificate()).await.expect("answered").proof;
+        assert!(alone.as_ref().is_ok_and(|proof| proof.clearance_lower_m > 0.0), "{}: {alone:?}", robot.name);
+        let verify = || certificate().of_robot(&scene, "robot");
+        assert_eq!(client.verify_motion(verify()).await.expect("answered").proof, alone, "{}", robot.name);
+        // In the way it is met, on the edge as well, and the certificate holds no more.
         client.put_objects(&scene, [("ball", &ball, place)]).await.expect("placed");
         let met = client.check_states(&scene, ask()).await.expect("answered");
         assert_eq!(met.verdicts, [StateVerdict::Contact], "{}", robot.name);
+        let met = client.check_motions(&scene, question()).await.expect("answered");
+        assert_eq!(met.verdicts(), [StateVerdict::Contact], "{}", robot.name);
+        let refused = client.verify_motion(verify()).await.expect("answered").proof.expect_err("the ball has moved");
+        assert!(refused.contains("obstacles"), "{refused}");
     }
 }

@@ -1,12 +1,13 @@
 //! Motions and their certificates, over the wire.
 
-use sublevel::client::{CertificateQuestion, MotionsQuestion};
+use sublevel::client::{CertificateQuestion, CheckedMotion, MotionsQuestion};
 use sublevel::scene::query::StateVerdict;
-use sublevel::scene::{Attach, Update};
-use sublevel::service::proto::{CheckMotionsRequest, MovingObjects, Verdict, VerifyMotionRequest};
+use sublevel::scene::{Attach, Subject, Update};
+use sublevel::service::proto::{CheckMotionsRequest, MovingObjects, PathKind, Verdict, VerifyMotionRequest};
+use sublevel::store::RobotSource;
 
 use super::questions::packed;
-use super::{at, cell, served};
+use super::{SRDF, URDF, at, cell, served};
 use crate::harness::field;
 
 fn refused<T: std::fmt::Debug>(answer: Result<T, tonic::Status>, at: &str) {
@@ -48,10 +49,6 @@ async fn whole_motions_are_proven_or_their_first_contact_is_bracketed() {
     let states = states.with_joint_values(&[QUARTER * (alpha - 1e-6), QUARTER * (s + 1e-6)]);
     let states = client.check_states("cell", states).await.expect("answered");
     assert_eq!(states.verdicts, [StateVerdict::Free, StateVerdict::Contact]);
-    let mut stopping = ask();
-    stopping.request_mut().stop_at_first = true;
-    let found = client.check_motions("cell", stopping).await.expect("answered");
-    assert!(found.motions[1..].iter().all(|motion| motion.verdict != StateVerdict::Contact));
     // A certificate holds by itself and against the scene, until that changes.
     let free = MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[-QUARTER]]).with_certificates();
     let found = client.check_motions("cell", free).await.expect("answered");
@@ -70,6 +67,219 @@ async fn whole_motions_are_proven_or_their_first_contact_is_bracketed() {
     let refused = client.verify_motion(of_scene()).await.expect("answered");
     assert!(!refused.holds() && refused.revision > Some(found.revision), "{refused:?}");
     assert!(refused.proof.expect_err("it does not hold").contains("obstacles"));
+}
+
+/// What is said of a path of which nothing is known.
+fn is_blank(motion: &CheckedMotion) -> bool {
+    motion.alpha == 0.0 && motion.clearance_lower_m.is_nan() && motion.contact.is_none() && motion.certificate.is_none()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_question_ends_at_the_first_path_that_is_not_free_or_when_its_time_is_over() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, mut clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    let put = Update { poses: vec![("post".into(), at(1.3, 0.0, 0.3))], ..Update::default() };
+    client.update_scene("cell", &put).await.expect("moved");
+    // Each of the last takes milliseconds: all together take many seconds on any machine.
+    const MANY: usize = 3000;
+    let ask = |first: &[[f64; 2]], many: usize| {
+        let question = MotionsQuestion::of_robot("one", ["lift"]);
+        let ways = first.iter().copied().chain(std::iter::repeat_n([0.0, -QUARTER], many));
+        let mut question = ways.fold(question, |question, way| question.with_path([&way[..1], &way[1..]]));
+        question.request_mut().clearance_accuracy_m = Some(1e-6);
+        question
+    };
+    let (free, contact, invalid) = ([0.0, -1.0], [0.0, QUARTER], [0.0, 2.5]);
+    let all = client.check_motions("cell", ask(&[contact, free, invalid, contact], 2)).await.expect("answered");
+    let (is_free, is_contact, is_invalid) = (StateVerdict::Free, StateVerdict::Contact, StateVerdict::Invalid);
+    assert_eq!(all.verdicts(), [is_contact, is_free, is_invalid, is_contact, is_free, is_free]);
+    assert!(all.complete);
+    for (first, expected) in [
+        (&[contact][..], &[is_contact][..]),
+        (&[free, contact], &[is_free, is_contact]),
+        (&[free, free, invalid], &[is_free, is_free, is_invalid]),
+    ] {
+        let mut question = ask(first, MANY);
+        question.request_mut().stop_at_first = true;
+        let found = client.check_motions("cell", question).await.expect("answered");
+        assert_eq!(found.motions.len(), first.len() + MANY);
+        let (verdicts, count) = (found.verdicts(), first.len());
+        assert_eq!(verdicts[..count], *expected, "what comes before is looked at");
+        let skipped = found.motions.iter().filter(|motion| motion.verdict == StateVerdict::NotChecked);
+        let skipped: Vec<_> = skipped.collect();
+        assert!(skipped.len() > MANY / 2 && skipped.iter().all(|motion| is_blank(motion)), "{}", skipped.len());
+        assert_eq!(verdicts.last(), Some(&StateVerdict::NotChecked));
+        assert!(!found.complete && !found.are_free());
+    }
+    // A budget of a millisecond ends it with what is known.
+    let mut question = ask(&[free], MANY);
+    question.request_mut().budget_ms = Some(1);
+    let found = client.check_motions("cell", question).await.expect("answered");
+    assert!(!found.complete && found.verdicts().last() == Some(&StateVerdict::NotChecked));
+    let all = found.motions.iter().all(|motion| match motion.verdict {
+        StateVerdict::Free => motion.alpha == 1.0 && motion.clearance_lower_m > 0.0,
+        StateVerdict::Undecided => motion.alpha < 1.0,
+        verdict => verdict == StateVerdict::NotChecked && is_blank(motion),
+    });
+    assert!(all, "{:?}", found.motions);
+    let none = CheckMotionsRequest {
+        scene: "cell".into(),
+        robot: "one".into(),
+        joint_values: packed(&[0.0, 0.0, 0.5, 0.1]),
+        budget_ms: Some(0),
+        ..Default::default()
+    };
+    refused(clients.queries.check_motions(none).await, "budget_ms");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn paths_with_unusable_values_are_invalid_and_no_others() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    let nan = f64::NAN;
+    let paths: [(&[[f64; 2]], StateVerdict); 7] = [
+        (&[[0.0, nan], [-0.5, 0.0]], StateVerdict::Invalid),
+        (&[[0.0, 0.0], [-0.5, 0.0]], StateVerdict::Free),
+        (&[[0.0, 0.0], [nan, 0.0], [-0.5, 0.0]], StateVerdict::Invalid),
+        (&[[0.0, 0.0], [f64::INFINITY, 0.0]], StateVerdict::Invalid),
+        (&[[0.0, 0.0], [-0.5, 0.0], [-2.0000001, 0.0]], StateVerdict::Invalid),
+        (&[[0.0, 0.0], [0.0, 0.2], [-2.0, 0.2]], StateVerdict::Free),
+        (&[[0.0, 0.0], [0.0, -1e-8]], StateVerdict::Invalid),
+    ];
+    let question = MotionsQuestion::of_robot("one", []);
+    let question =
+        paths.iter().fold(question, |question, (path, _)| question.with_path(path.iter().map(|point| &point[..])));
+    let found = client.check_motions("cell", question).await.expect("answered");
+    for (motion, (path, expected)) in found.motions.iter().zip(paths) {
+        assert_eq!(motion.verdict, expected, "{path:?}");
+        assert_eq!(is_blank(motion), expected == StateVerdict::Invalid, "{path:?}: {motion:?}");
+    }
+    assert!(found.complete && found.motions.len() == paths.len());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn searches_that_may_not_look_closer_leave_paths_undecided() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    // What is held stops 18 mm before the ball.
+    let put = Update { poses: vec![("post".into(), at(1.3, 0.0, 0.3))], ..Update::default() };
+    client.update_scene("cell", &put).await.expect("moved");
+    let ask = || MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[1.48]]).with_certificates();
+    let free = client.check_motions("cell", ask()).await.expect("answered");
+    assert!(free.are_free() && free.complete && free.motions[0].certificate.is_some());
+    let mut one = ask();
+    one.request_mut().max_configurations = Some(1);
+    let found = client.check_motions("cell", one).await.expect("answered");
+    let motion = &found.motions[0];
+    assert!(motion.verdict == StateVerdict::Undecided && motion.alpha == 0.0 && !found.complete, "{found:?}");
+    assert!(motion.certificate.is_none());
+    // What moves by less than 10 m is not looked at again: as far as the resolution it is decided.
+    let mut coarse = ask();
+    coarse.request_mut().resolution_m = Some(10.0);
+    let found = client.check_motions("cell", coarse).await.expect("answered");
+    let motion = &found.motions[0];
+    assert!(motion.verdict == StateVerdict::Undecided && motion.alpha < 1.0 && found.complete, "{found:?}");
+    let (pair, s) = motion.contact.clone().expect("the pair that is open");
+    assert!(pair.iter().any(|name| name.starts_with("one/") || name == "held") && s == 0.5, "{pair:?} {s}");
+    assert!(motion.certificate.is_none());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn control_points_are_those_of_a_bezier_segment() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    let put = Update { poses: vec![("post".into(), at(1.3, 0.0, 0.3))], ..Update::default() };
+    client.update_scene("cell", &put).await.expect("moved");
+    let ask = |peak: f64, kind: PathKind| {
+        let path = [[0.0], [peak], [peak], [0.0]];
+        let question = MotionsQuestion::of_robot("one", ["lift"]).with_path(path.iter().map(|point| &point[..]));
+        let mut question = question.with_certificates();
+        question.request_mut().kind = kind.into();
+        question.request_mut().first_contact = true;
+        question
+    };
+    // What is held and the ball are 1.3 m from the joint and touch where they are 0.1 m apart; the
+    // curve rises to three quarters of its control points, the lines to all of them.
+    let touch = QUARTER - 2.0 * (0.05_f64 / 1.3).asin();
+    let found = client.check_motions("cell", ask(1.9, PathKind::Bezier)).await.expect("answered");
+    assert!(0.75 * 1.9 < touch && found.are_free(), "{found:?}");
+    let certificate = found.motions[0].certificate.clone().expect("a certificate");
+    let question = CertificateQuestion::new(certificate).of_robot("cell", "one");
+    assert!(client.verify_motion(question).await.expect("answered").holds());
+    for (peak, kind, s) in [
+        (2.0, PathKind::Bezier, 0.5 - (0.25 - touch / 6.0).sqrt()),
+        (1.9, PathKind::Waypoints, touch / 1.9 / 3.0),
+        (1.9, PathKind::Unspecified, touch / 1.9 / 3.0),
+    ] {
+        let found = client.check_motions("cell", ask(peak, kind)).await.expect("answered");
+        let motion = &found.motions[0];
+        let (pair, at) = motion.contact.clone().expect("a contact");
+        assert!(["held", "post"].iter().all(|name| pair.contains(&(*name).to_owned())), "{pair:?}");
+        assert_eq!(motion.verdict, StateVerdict::Contact);
+        assert!(motion.alpha <= s && s <= at && at - motion.alpha < 1e-3, "{kind:?}: {} {s} {at}", motion.alpha);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_certificate_of_something_else_is_refused_with_what_differs() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    let question = MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[-QUARTER]]).with_certificates();
+    let found = client.check_motions("cell", question).await.expect("answered");
+    let certificate = found.motions[0].certificate.clone().expect("a certificate");
+    let of = |robot: &str| CertificateQuestion::new(certificate.clone()).of_robot("cell", robot);
+    let holds = async || client.verify_motion(of("one")).await.expect("answered").proof.map(|_| ());
+    let reason = async || holds().await.expect_err("it is of something else");
+    assert_eq!(holds().await, Ok(()));
+    // The other robot of the scene is the same, but elsewhere, and holds nothing.
+    let other = client.verify_motion(of("two")).await.expect("answered").proof;
+    assert!(other.expect_err("another place").contains("base pose"));
+    let mut all = of("one");
+    all.request_mut().include_allowed = true;
+    let all = client.verify_motion(all).await.expect("answered").proof;
+    assert!(all.expect_err("more pairs").contains("allowed pairs"));
+    let base = |x: f64| Update { bases: vec![("one".into(), at(x, 0.0, 0.0))], ..Update::default() };
+    let group = || Subject::Group("one".into());
+    let allow = vec![(group(), Subject::Object("post".into()))];
+    let padding = |padding| Update { group_paddings: vec![("one".into(), padding)], ..Update::default() };
+    let changes = [
+        (base(1e-9), base(0.0), "base pose"),
+        (
+            Update { allow: allow.clone(), ..Update::default() },
+            Update { forbid: allow, ..Update::default() },
+            "allowed pairs",
+        ),
+        (padding(Some(1e-3)), padding(None), "margin or padding"),
+        (
+            Update { poses: vec![("post".into(), at(3.0, 1e-9, 2.0))], ..Update::default() },
+            Update { poses: vec![("post".into(), at(3.0, 0.0, 2.0))], ..Update::default() },
+            "obstacles",
+        ),
+    ];
+    for (change, back, word) in changes {
+        client.update_scene("cell", &change).await.expect("changed");
+        let reason = reason().await;
+        assert!(reason.contains(word), "{word}: {reason}");
+        client.update_scene("cell", &back).await.expect("changed back");
+        assert_eq!(holds().await, Ok(()), "{word}");
+    }
+    // Where one of the limits is another, though the motion keeps within both.
+    let hand = robot.links.iter().find(|link| &*link.name == "hand").and_then(|link| link.body).expect("a body");
+    let source = |urdf: String| RobotSource { urdf, srdf: SRDF.into(), bodies: [("hand".into(), hand)].into() };
+    let other = source(URDF.replace("upper=\"2\"", "upper=\"2.1\""));
+    let other = client.load_robot(&other).await.expect("loaded");
+    client.delete_scene("cell").await.expect("deleted");
+    cell(&client, &other).await;
+    let reason = reason().await;
+    assert!(reason.contains("another robot"), "{reason}");
+    client.delete_scene("cell").await.expect("deleted");
+    cell(&client, &robot).await;
+    assert_eq!(holds().await, Ok(()), "the same scene made anew");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -2,8 +2,9 @@
 
 use sublevel::service::proto::fit_mesh::Content;
 use sublevel::service::proto::{
-    CheckStatesRequest, ClearanceRequest, FitMesh, JointValues, LinkBody, LinkMesh, LoadRobotRequest, MeshFormat,
-    Object, RobotInstance, SetJoints, SetRobotBase, StreamPosesRequest, UpdateSceneRequest,
+    Attach, Attachment, CheckStatesRequest, ClearanceRequest, FitMesh, JointValues, LinkBody, LinkMesh,
+    LoadRobotRequest, MeshFormat, Object, RobotInstance, SetJoints, SetRobotBase, StreamPosesRequest,
+    UpdateSceneRequest,
 };
 use tonic::{Code, Status};
 
@@ -97,6 +98,11 @@ async fn updates() {
         ..update()
     };
     let place = |placed: RobotInstance| UpdateSceneRequest { place_robots: vec![placed], ..update() };
+    let attach = |object: &str, to: &str| {
+        let attachment = Attachment { to: to.into(), pose: Some(at(0.0)), touch: Vec::new() };
+        let attach = Attach { object: object.into(), attachment: Some(attachment) };
+        UpdateSceneRequest { attach: vec![attach], ..update() }
+    };
     let id = robot.id.to_string();
     let instance = || RobotInstance { name: "three".into(), robot_id: id.clone(), base: Some(at(9.0)), joints: None };
     let both = JointValues { rows: vec![0.0], ..values(&["lift"], &[0.0]) };
@@ -140,6 +146,10 @@ async fn updates() {
         (UpdateSceneRequest { remove_robots: vec!["five".into()], ..update() }, missing, "remove_robots[0]"),
         (UpdateSceneRequest { remove_objects: vec!["two/arm".into()], ..update() }, invalid, "remove_objects[0]"),
         (UpdateSceneRequest { detach: vec!["two/arm".into()], ..update() }, invalid, "detach[0]"),
+        (attach("two/arm", "two/arm"), invalid, "attach[0].object"),
+        (attach("two/arm", "two/hand"), invalid, "attach[0].object"),
+        (attach("post", "post"), invalid, "attach[0].object"),
+        (attach("post", "two/flange"), missing, "attach[0].object"),
         (
             UpdateSceneRequest { set_poses: rows(vec![moved("two/arm", at(0.0))]), ..update() },
             invalid,
