@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use serde_json::Value;
 use sublevel_core::body::{Body, Compound, Shape};
 use sublevel_core::measure::{Capsule, HalfSpace, Options, Pose, WarmStart};
 use sublevel_testkit::Seeded;
@@ -13,7 +14,7 @@ use sublevel_testkit::random::at;
 use super::placing::Placing;
 use super::solve::solve;
 use super::*;
-use crate::description::{Description, Joint, JointKind, Limits, Link};
+use crate::description::{Description, Joint, JointKind, Limits, Link, Mimic};
 use crate::kinematics::Kinematics;
 use crate::kinematics::tests::{configuration, tree};
 
@@ -368,14 +369,19 @@ fn searches_end_when_they_have_to() {
     assert!(found.contact.is_some_and(|open| open.lower_m > 0.0 && open.s > 0.2 && open.s < 0.8));
 }
 
-#[test]
-fn a_changed_certificate_is_refused_or_what_it_claims_is_true() {
+/// What keeps an egg apart from a cylinder that it goes past.
+fn past_a_cylinder() -> (MotionProblem, Certificate) {
     let cylinder = solid(Body::cylinder("cylinder", 0.2, 0.5).expect("a cylinder"));
     let egg = solid(Body::superellipsoid("egg", Vector3::zeros(), Vector3::new(0.1, 0.12, 0.08), 4).expect("a body"));
     let problem = problem(hand(egg), vec![still("post", cylinder, at(0.0, 2.35, 0.0))], 0.0);
     let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
     let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
-    let certificate = found.certificate.expect("a certificate");
+    (problem, *found.certificate.expect("a certificate"))
+}
+
+#[test]
+fn a_certificate_with_another_digest_is_not_read() {
+    let (_, certificate) = past_a_cylinder();
     let text = certificate.to_json();
     assert!(certificate.verify().is_ok());
     // Cut off, or a byte changed anywhere: the digest does not fit, or it is no JSON.
@@ -392,71 +398,330 @@ fn a_changed_certificate_is_refused_or_what_it_claims_is_true() {
         changed_bytes += 1;
     }
     assert!(changed_bytes > 500);
-    // The digest can be computed again for a changed claim; each field in turn.
-    let value: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-    let (mut refused, mut kept) = (0, 0);
-    for (index, (place, number)) in numbers(&value).into_iter().enumerate() {
-        // Each number once, in turn a little changed, turned round, cleared and made huge.
-        for replaced in [[number + 0.25, -number, 0.0, 1e9][index % 4]] {
-            let mut changed = value.clone();
-            *changed.pointer_mut(&place).expect("a place") =
-                if number.fract() == 0.0 && replaced.fract() == 0.0 && replaced >= 0.0 {
-                    serde_json::json!(replaced as u64)
-                } else {
-                    serde_json::json!(replaced)
-                };
-            let Ok(mut read) = serde_json::from_value::<Certificate>(changed) else { continue };
-            read.digest = read.computed_digest();
-            match read.verify() {
-                Err(_) => refused += 1,
-                Ok(verified) => {
-                    // True of what it says now.
-                    let problem = read.claim.problem(&VerifyOptions::default(), usize::MAX).expect("a problem");
-                    let least = sampled(&problem, &read.path, 0.0, 1.0, 20);
-                    assert!(
-                        least > read.margin_m() - 1e-12 && least >= verified.clearance_lower_m - 1e-12,
-                        "{place}: {least}"
-                    );
-                    kept += 1;
+}
+
+/// Whether places of a document are of the proofs of bodies, which take long to check again, or
+/// only others.
+#[derive(Clone, Copy, PartialEq)]
+enum Places {
+    Solids,
+    Others,
+}
+
+/// A document with one place changed, and what was done there.
+type Changed = (String, Value);
+
+/// The document with every change of every place: numbers, strings and truth values replaced by
+/// each of several others, nulls by what could stand there, everything by null, entries and fields
+/// left out, entries repeated, and a field more.
+fn changes(document: &Value, places: Places) -> Vec<Changed> {
+    let (mut open, mut found) = (vec![String::new()], Vec::new());
+    while let Some(place) = open.pop() {
+        let here = document.pointer(&place).expect("a place");
+        let mut add = |what: String, value: Value| {
+            let mut changed = document.clone();
+            *changed.pointer_mut(&place).expect("a place") = value;
+            found.push((format!("{place}: {what}"), changed));
+        };
+        for value in replacements(here) {
+            add(format!("{value}"), value);
+        }
+        match here {
+            Value::Array(items) => {
+                for index in 0..items.len() {
+                    let mut less = items.clone();
+                    let item = less.remove(index);
+                    add(format!("without {index}"), less.into());
+                    let mut more = items.clone();
+                    more.insert(index, item);
+                    add(format!("{index} twice"), more.into());
+                    open.push(format!("{place}/{index}"));
                 }
+            }
+            Value::Object(fields) => {
+                for name in fields.keys() {
+                    let mut less = fields.clone();
+                    less.remove(name);
+                    add(format!("without {name}"), less.into());
+                    let inside = format!("{place}/{name}");
+                    if places == Places::Solids || inside != "/claim/solids" {
+                        open.push(inside);
+                    }
+                }
+                let mut more = fields.clone();
+                more.insert("more".to_owned(), 0.into());
+                add("with a field more".to_owned(), more.into());
+            }
+            _ => {}
+        }
+    }
+    found.retain(|(what, _)| what.starts_with("/claim/solids/") == (places == Places::Solids));
+    found
+}
+
+/// Other values for a place.
+fn replacements(here: &Value) -> Vec<Value> {
+    let mut others = match here {
+        Value::Number(number) => {
+            let number = number.as_f64().expect("a number");
+            let whole = |value: f64| number.fract() == 0.0 && value.fract() == 0.0 && value >= 0.0;
+            let values = [number + 0.25, number + 1.0, number * 1.001, -number, 0.0, 1e9];
+            let value = |value: f64| if whole(value) { Value::from(value as u64) } else { Value::from(value) };
+            values.into_iter().filter(|value| *value != number).map(value).collect()
+        }
+        Value::String(_) => {
+            let words = ["", "other", "fixed", "revolute", "continuous", "prismatic", "planar", "balls", "planes"];
+            words.into_iter().map(Value::from).collect()
+        }
+        Value::Bool(truth) => vec![Value::from(!truth)],
+        // Limits, a joint that is followed, a support point.
+        Value::Null => vec![
+            serde_json::json!([-1.0, 1.0]),
+            serde_json::json!([0, 0.5, 0.0]),
+            serde_json::json!({"point": [0.0, 0.0, 0.0], "multipliers": []}),
+        ],
+        _ => Vec::new(),
+    };
+    others.push(Value::Null);
+    others.retain(|other| other != here);
+    others
+}
+
+/// What became of the changes of a certificate.
+#[derive(Debug, Default)]
+struct Tally {
+    unread: u32,
+    refused: u32,
+    kept: u32,
+}
+
+/// Reads every change of a certificate with a digest that fits, and checks that it is refused, or
+/// that what it claims is true: at samples of its path, by the solver alone.
+fn tally(certificate: &Certificate, problem: &MotionProblem, places: Places) -> Tally {
+    let shapes = problem.bodies().iter().map(|body| &body.shape);
+    let shapes = shapes.chain(problem.obstacles().iter().filter_map(|obstacle| match &obstacle.placed {
+        PlacedObstacle::Still(shape, _) | PlacedObstacle::Moving { shape, .. } => Some(shape),
+        PlacedObstacle::HalfSpace(..) => None,
+    }));
+    let solids: Vec<_> = shapes
+        .filter_map(|shape| match shape {
+            MotionShape::Solid(solid) => Some(solid.clone()),
+            MotionShape::Capsule(_) => None,
+        })
+        .collect();
+    let known = |id: &str| solids.iter().find(|solid| solid.id().to_string() == id).cloned();
+    let options = VerifyOptions { known: Some(&known), stop: None };
+    let original: Value = serde_json::from_str(&certificate.to_json()).expect("JSON");
+    let mut tally = Tally::default();
+    for (what, changed) in changes(&original, places) {
+        let Ok(mut read) = serde_json::from_value::<Certificate>(changed) else {
+            tally.unread += 1;
+            continue;
+        };
+        read.digest = read.computed_digest();
+        let Ok(read) = Certificate::from_json(&read.to_json()) else {
+            tally.unread += 1;
+            continue;
+        };
+        match read.verify_with(&options) {
+            Err(_) => tally.refused += 1,
+            Ok(verified) => {
+                let problem = read.claim.problem(&options, usize::MAX).expect("a problem");
+                let least = sampled(&problem, &read.path, 0.0, 1.0, 16);
+                assert!(
+                    least > read.margin_m() - 1e-12 && least >= verified.clearance_lower_m - 1e-12,
+                    "{what}: {least}, {verified:?}"
+                );
+                tally.kept += 1;
             }
         }
     }
-    assert!(refused > 50 && kept > 5, "{refused} refused, {kept} kept");
-    // Another scene.
-    let mut other = problem.clone();
-    other.margin_m = 0.001;
-    other.claim = Default::default();
-    assert_eq!(certificate.verify_against(&other), Err(CertificateError::Other("margin or padding")));
-    let moved = vec![still("post", ball(0.1), at(0.0, 2.35, 0.0))];
-    let other = self::problem(hand(ball(0.1)), moved, 0.0);
-    assert_eq!(certificate.verify_against(&other), Err(CertificateError::Other("set of bodies")));
+    println!("{tally:?}");
+    tally
+}
+
+#[test]
+fn a_changed_certificate_is_refused_or_what_it_claims_is_true() {
+    let (problem, certificate) = past_a_cylinder();
+    let of = tally(&certificate, &problem, Places::Others);
+    assert!(of.unread > 300 && of.refused > 300 && of.kept > 50, "{of:?}");
     // A record less.
-    let mut less = (*certificate).clone();
+    let mut less = certificate.clone();
     less.records.pop();
     less.digest = less.computed_digest();
     assert!(matches!(less.verify(), Err(CertificateError::Gap { segment: 0, .. })));
 }
 
-/// Places of numbers in a document, without those of the proofs of bodies, which take long to check
-/// again and have tests of their own.
-fn numbers(value: &serde_json::Value) -> Vec<(String, f64)> {
-    let mut open = vec![(String::new(), value)];
-    let mut found = Vec::new();
-    while let Some((place, value)) = open.pop() {
-        match value {
-            serde_json::Value::Number(number) => found.extend(number.as_f64().map(|number| (place, number))),
-            serde_json::Value::Array(items) => {
-                open.extend(items.iter().enumerate().map(|(index, item)| (format!("{place}/{index}"), item)));
-            }
-            serde_json::Value::Object(fields) => {
-                let fields = fields.iter().filter(|(name, _)| *name != "solids");
-                open.extend(fields.map(|(name, field)| (format!("{place}/{name}"), field)));
-            }
-            _ => {}
-        }
+#[test]
+fn changed_support_points_prove_no_more_than_is_true() {
+    // 10 µm from a ball, where only a support point of the body proves that it is not nearer.
+    let turn = UnitQuaternion::from_euler_angles(0.4, 0.7, -0.2);
+    let body = Body::superellipsoid("q6", Vector3::zeros(), Vector3::new(0.3, 0.2, 0.1), 6).expect("a body");
+    let body = body.moved(&turn, &Vector3::zeros()).expect("a body");
+    let farthest = body.support(&Vector3::x()).point;
+    let beside = at(2.0 + farthest.x + 0.1 + 1e-5, farthest.y, farthest.z);
+    let problem = problem(hand(solid(body)), vec![still("ball", ball(0.1), beside)], 0.0);
+    let path = edge(&problem, &[0.0; 3], &[1e-7, 0.0, 0.0]);
+    let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
+    let certificate = found.certificate.expect("a certificate");
+    assert!(certificate.to_json().contains("tangents") && certificate.verify().is_ok());
+    let of = tally(&certificate, &problem, Places::Others);
+    assert!(of.unread > 200 && of.refused > 200 && of.kept > 20, "{of:?}");
+}
+
+#[test]
+fn a_certificate_with_changed_bodies_is_refused_or_what_it_claims_is_true() {
+    let (problem, certificate) = past_a_cylinder();
+    let of = tally(&certificate, &problem, Places::Solids);
+    assert!(of.refused > 1000 && of.unread == 0, "{of:?}");
+}
+
+/// The arm with a flap at its end that follows the elbow, two eggs on the hand, a capsule on the
+/// flap; among all kinds of obstacles, with allowed pairs and paddings.
+fn of_all_kinds() -> MotionProblem {
+    let description = arm().description().clone();
+    let (mut links, mut joints) = (description.links, description.joints);
+    links.push(Link { name: "flap".into(), collisions: Vec::new() });
+    joints.push(Joint {
+        name: "flap".into(),
+        kind: JointKind::Revolute,
+        parent: 3,
+        child: 4,
+        origin: Isometry3::translation(1.0, 0.0, 0.0),
+        axis: Vector3::y_axis(),
+        limits: Some(Limits { lower: -2.0, upper: 2.0 }),
+        mimic: Some(Mimic { joint: 2, multiplier: -0.5, offset: 0.1 }),
+    });
+    let kinematics = Arc::new(Kinematics::new(&Description { links, joints, ..description }).expect("a tree"));
+    let eggs = [-0.1, 0.15].map(|x| Body::superellipsoid("egg", Vector3::x() * x, Vector3::new(0.1, 0.08, 0.05), 4));
+    let eggs = Compound::new("eggs", eggs.map(|egg| egg.expect("a body")).into()).expect("a compound");
+    let eggs = MotionShape::Solid(Arc::new(Shape::Compound(Box::new(eggs))));
+    let capsule = MotionShape::Capsule(Capsule::new(0.04, 0.1).expect("a capsule"));
+    let cuboid = solid(Body::cuboid("box", Vector3::new(0.1, 0.1, 0.3)).expect("a box"));
+    let body = |name: &str, link, x, shape: &MotionShape| MotionBody {
+        name: name.into(),
+        link,
+        place: at(x, 0.0, 0.0),
+        shape: shape.clone(),
+    };
+    let bodies = vec![body("mast", 1, 0.0, &cuboid), body("hand", 3, 0.7, &eggs), body("flap", 4, 0.15, &capsule)];
+    let moving = |name: &str, shape: &MotionShape, from: Pose, to: Pose, place: Pose| MotionObstacle {
+        name: name.into(),
+        placed: PlacedObstacle::Moving { shape: shape.clone(), from, to, place },
+    };
+    let ground = HalfSpace::new(Vector3::z(), -1.2).expect("a half-space");
+    let obstacles = vec![
+        still("post", cuboid.clone(), at(0.0, 2.6, 0.0)),
+        moving("cart", &ball(0.2), at(3.0, -1.0, 0.0), at(3.0, 1.5, 0.2), Pose::identity()),
+        moving("load", &capsule, at(3.0, -1.0, 0.0), at(3.0, 1.5, 0.2), at(0.0, 0.0, 0.4)),
+        MotionObstacle { name: "ground".into(), placed: PlacedObstacle::HalfSpace(ground, 1e-9) },
+    ];
+    let robot = MotionRobot { kinematics, base: at(0.0, 0.0, 0.1), bodies };
+    MotionProblem::new(robot, obstacles, 0.01, |a, b| match (a, b) {
+        (MotionItem::Body(1), MotionItem::Body(2)) | (MotionItem::Body(0), MotionItem::Obstacle(3)) => None,
+        (MotionItem::Body(1), MotionItem::Obstacle(0)) => Some(0.02),
+        (MotionItem::Body(2), MotionItem::Obstacle(_)) => Some(-0.005),
+        _ => Some(0.0),
+    })
+    .expect("a problem")
+}
+
+#[test]
+fn changed_certificates_with_all_that_can_be_claimed() {
+    let problem = of_all_kinds();
+    let around = vec![0.0, 0.0, 0.2, 0.3, 1.0, 1.2, 0.0, 2.0, -0.3];
+    for path in [
+        Path::waypoints(problem.kinematics(), around.clone()).expect("a path"),
+        Path::bezier(problem.kinematics(), around).expect("a path"),
+    ] {
+        let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
+        assert_eq!(found.verdict, MotionVerdict::Free, "{:?}", found.contact);
+        let certificate = found.certificate.expect("a certificate");
+        let verified = certificate.verify().expect("a proof");
+        assert!(verified.pairs > 15 && sampled(&problem, &path, 0.0, 1.0, 100) >= verified.clearance_lower_m);
+        println!("{} records, {} bytes", certificate.records(), certificate.to_json().len());
+        let of = tally(&certificate, &problem, Places::Others);
+        assert!(of.unread > 1000 && of.refused > 1000 && of.kept > 100, "{of:?}");
     }
-    found
+}
+
+#[test]
+fn a_certificate_of_something_else_says_what_differs() {
+    let problem = of_all_kinds();
+    let path = edge(&problem, &[0.0, 0.0, 0.2], &[0.1, 0.2, 0.0]);
+    let found = prove(&problem, &path, &MotionOptions { certificate: true, ..FIRST });
+    let certificate = found.certificate.expect("a certificate");
+    assert!(certificate.verify_against(&problem).is_ok());
+    let rules = || problem.rules.clone();
+    let robot = || MotionRobot {
+        kinematics: problem.kinematics.clone(),
+        base: at(0.0, 0.0, 0.1),
+        bodies: problem.bodies.clone(),
+    };
+    let obstacles = || problem.obstacles.clone();
+    let other = |robot: MotionRobot, obstacles: Vec<MotionObstacle>, margin_m: f64, rules: Vec<_>| {
+        let other = MotionProblem::of_rules(robot, obstacles, margin_m, rules).expect("a problem");
+        certificate.verify_against(&other).map(|_| ())
+    };
+    assert_eq!(other(robot(), obstacles(), 0.01, rules()), Ok(()), "the same made again");
+    let differs = |what: &'static str| Err(CertificateError::Other(what));
+    // Of the robot: a limit, what is followed and how, an axis, a name.
+    let description = problem.kinematics().description();
+    let changes: [&dyn Fn(&mut Description); 5] = [
+        &|description| description.joints[0].limits = Some(Limits { lower: -4.0, upper: 4.5 }),
+        &|description| description.joints[3].mimic = Some(Mimic { joint: 2, multiplier: -0.5, offset: 0.1 + 1e-16 }),
+        &|description| description.joints[3].mimic = Some(Mimic { joint: 1, multiplier: -0.5, offset: 0.1 }),
+        &|description| description.joints[1].axis = -description.joints[1].axis,
+        &|description| description.name = "leg".into(),
+    ];
+    for change in changes {
+        let mut changed = description.clone();
+        change(&mut changed);
+        let kinematics = Arc::new(Kinematics::new(&changed).expect("a tree"));
+        let found = other(MotionRobot { kinematics, ..robot() }, obstacles(), 0.01, rules());
+        assert_eq!(found, differs("robot"), "{changed:?}");
+    }
+    let moved = MotionRobot { base: at(0.0, 1e-12, 0.1), ..robot() };
+    assert_eq!(other(moved, obstacles(), 0.01, rules()), differs("base pose"));
+    let bodies = |change: &dyn Fn(&mut Vec<MotionBody>)| {
+        let mut bodies = problem.bodies.clone();
+        change(&mut bodies);
+        other(MotionRobot { bodies, ..robot() }, obstacles(), 0.01, rules())
+    };
+    assert_eq!(bodies(&|bodies| bodies[1].place = at(0.7, 1e-12, 0.0)), differs("set of bodies"));
+    assert_eq!(bodies(&|bodies| bodies[2].link = 3), differs("set of bodies"));
+    assert_eq!(bodies(&|bodies| bodies[2].shape = ball(0.04)), differs("set of bodies"));
+    let among = |change: &dyn Fn(&mut Vec<MotionObstacle>)| {
+        let mut obstacles = problem.obstacles.clone();
+        change(&mut obstacles);
+        let count = obstacles.len();
+        let is_there = |item: &MotionItem| !matches!(item, MotionItem::Obstacle(index) if *index >= count);
+        let rules = rules().into_iter().filter(|(_, b, _)| is_there(b)).collect();
+        other(robot(), obstacles, 0.01, rules)
+    };
+    let moving = |z: f64| PlacedObstacle::Moving {
+        shape: ball(0.2),
+        from: at(3.0, -1.0, 0.0),
+        to: at(3.0, 1.5, z),
+        place: Pose::identity(),
+    };
+    assert_eq!(among(&|obstacles| obstacles[1].placed = moving(0.2)), Ok(()), "the same body made again");
+    assert_eq!(among(&|obstacles| obstacles[1].placed = moving(0.3)), differs("set of obstacles"));
+    assert_eq!(among(&|obstacles| obstacles[0].name = "pillar".into()), differs("set of obstacles"));
+    assert_eq!(among(&|obstacles| obstacles.truncate(3)), differs("set of obstacles"));
+    assert_eq!(among(&|obstacles| obstacles.swap(1, 2)), differs("set of obstacles"));
+    assert_eq!(other(robot(), obstacles(), 0.02, rules()), differs("margin or padding"));
+    let mut padded = rules();
+    padded[0].2 = 1e-9;
+    assert_eq!(other(robot(), obstacles(), 0.01, padded), differs("margin or padding"));
+    // Fewer pairs that count, and more.
+    assert_eq!(other(robot(), obstacles(), 0.01, rules()[1..].to_vec()), differs("set of allowed pairs"));
+    let more = MotionProblem::new(robot(), obstacles(), 0.01, |a, b| {
+        let rule = rules().into_iter().find(|rule| (rule.0, rule.1) == (a, b));
+        Some(rule.map_or(0.0, |rule| rule.2))
+    });
+    let more = certificate.verify_against(&more.expect("a problem"));
+    assert_eq!(more, Err(CertificateError::Other("set of allowed pairs")));
 }
 
 fn derive(problem: &MotionProblem, items: [MotionItem; 2]) -> DerivedPair {
