@@ -35,6 +35,10 @@ struct Report {
     covers: Option<&'static str>,
 }
 
+/// What certificates of motions begin with, those as well that were cut off and are no JSON any
+/// more.
+const CERTIFICATE: &str = "{\"format\":\"sublevel motion certificate";
+
 /// Proves, prints, and returns whether every claim is proven.
 pub(super) fn run(args: &VerifyArgs) -> Outcome {
     #[cfg(feature = "fit")]
@@ -44,7 +48,7 @@ pub(super) fn run(args: &VerifyArgs) -> Outcome {
         );
     }
     let text = read(&args.file)?;
-    if Certificate::is_file(&text) {
+    if Certificate::is_file(&text) || text.trim_start().starts_with(CERTIFICATE) {
         return motion(args, &text);
     }
     if SosBody::is_file(&text) {

@@ -45,7 +45,11 @@ impl Files {
 
     /// The one line that it says where it must refuse, with its exit code.
     fn refusal(&self, urdf: &str, more: &[&str]) -> (String, i32) {
-        let (urdf, out) = (self.path(urdf), self.path("refused"));
+        self.refusal_into("refused", urdf, more)
+    }
+
+    fn refusal_into(&self, out: &str, urdf: &str, more: &[&str]) -> (String, i32) {
+        let (urdf, out) = (self.path(urdf), self.path(out));
         let done = run(&[&["robot", &urdf, "--out", &out], more].concat());
         let said = String::from_utf8(done.stderr).expect("text");
         assert!(!said.contains("panicked") && done.stdout.is_empty(), "{said}");
@@ -112,6 +116,12 @@ fn a_robot_is_fitted_within_its_gap_and_kept() {
     assert!(line.ends_with("kept") && table.contains("4 links with geometry, 1 frames, 2 joint values"), "{table}");
     // The SRDF is part of what a robot is.
     assert!(table.contains("3 may touch") && !table.contains(report["id"].as_str().expect("text")), "{table}");
+
+    // A file that was damaged meanwhile is not taken for one.
+    std::fs::write(body, &before[..before.len() / 2]).expect("written");
+    let (said, code) = files.refusal_into("new/links", "crane.urdf", &["--max-gap", "1cm"]);
+    assert!(code == 1 && said.contains("link \"hand\"") && said.contains(&name), "{code} {said}");
+    std::fs::write(body, &before).expect("written");
 
     // Another gap, a degree and another mesh are fitted anew, and nothing is written over.
     let finer = format!("{}", 0.5 * gap);
@@ -321,8 +331,9 @@ async fn certificates_of_motions_are_verified() {
     };
     is_refused(&text.replacen("\"margin_m\":0.01", "\"margin_m\":0.02", 1), "digest");
     is_refused(&text.replacen("-1.5", "-1.6", 1), "digest");
-    let (code, _, said) = verified(dir.path(), &text[..text.len() - 2], &[]);
-    assert!(code == Some(1) && said.contains("EOF"), "cut off: {code:?} {said}");
+    is_refused(&text[..text.len() - 2], "no motion certificate: EOF");
+    is_refused(&text[..text.len() / 2], "no motion certificate: EOF");
+    is_refused(&text.replacen("\"path\"", "path", 1), "no motion certificate");
     is_refused(&text.replacen("certificate 1", "certificate 2", 1), "format");
     // With a digest that fits, by somebody who knows how: now the proof itself has to hold.
     assert_eq!(signed(format, [claim, path, records]), text);
