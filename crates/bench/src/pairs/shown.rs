@@ -7,7 +7,7 @@ use sublevel::draw::{ChartError, HeatMap};
 use super::kind::Kind;
 use super::race::{Question, Time, Who};
 use crate::csv::{CsvError, Row, Table};
-use crate::words::listed;
+use crate::words::{Span, listed};
 
 /// The rows of a CSV.
 pub(crate) struct Shown {
@@ -198,7 +198,7 @@ impl Shown {
     fn edges_in_short(&self) -> Option<String> {
         let span = |cut: bool, question| {
             let ours = self.times.iter().filter(|time| time.who == Who::Ours && time.question == question);
-            let of_kind = ours.filter(|time| time.kinds.contains(&Kind::SlabCut) == cut);
+            let of_kind = ours.filter(|time| time.kinds[1].is_first() && time.kinds.contains(&Kind::SlabCut) == cut);
             let (least, most) = of_kind.fold((f64::INFINITY, 0.0_f64), |(least, most), time| {
                 (least.min(1e-3 * time.nanoseconds), most.max(1e-3 * time.nanoseconds))
             });
@@ -208,11 +208,24 @@ impl Shown {
         };
         Some(format!(
             "- Bodies that slabs cut take {} µs with a hint and {} µs cold, where pairs of all other shapes take {} and {} µs\n  \
-             ([pairs](docs/pairs.md)).\n",
+             ([pairs](docs/pairs.md)).{}\n",
             span(true, Question::Warm)?,
             span(true, Question::Cold)?,
             span(false, Question::Warm)?,
-            span(false, Question::Cold)?
+            span(false, Question::Cold)?,
+            self.half_spaces_in_short().unwrap_or_default()
+        ))
+    }
+
+    /// What bodies take above half-spaces, of which there are none in earlier runs.
+    fn half_spaces_in_short(&self) -> Option<String> {
+        let above = |kind| self.ours([kind, Kind::HalfSpace], Question::Cold);
+        let smooth = Kind::ALL.into_iter().filter(|kind| matches!(kind, Kind::Degree(_))).filter_map(above);
+        let (smooth, cut) = (Span::of(smooth)?, above(Kind::SlabCut)?);
+        Some(format!(
+            " From half-spaces\n  smooth bodies take {} cold, and those that slabs cut {:.1} µs.",
+            smooth.microseconds(),
+            1e-3 * cut
         ))
     }
 
@@ -233,8 +246,10 @@ impl Shown {
             [Kind::Cuboid, Kind::Cylinder],
             [Kind::Cylinder, Kind::Cylinder],
             [Kind::Ball, Kind::Ball],
+            [Kind::Degree(6), Kind::HalfSpace],
         ];
-        for kinds in shown {
+        // Earlier runs had no half-spaces.
+        for kinds in shown.into_iter().filter(|kinds| self.ours(*kinds, Question::Cold).is_some()) {
             let time = |question| Some(format!("{:.0} ns", self.ours(kinds, question)?));
             let of_smooth = |question| {
                 Some(format!("{} ({:.1})", time(question)?, self.ours(kinds, question)? / smooth(question)?))
@@ -249,8 +264,8 @@ impl Shown {
                 kinds[1].name(),
                 of_smooth(Question::Cold)?,
                 of_smooth(Question::Warm)?,
-                time(Question::Near)?,
-                time(Question::Apart)?,
+                time(Question::Near).unwrap_or("-".into()),
+                time(Question::Apart).unwrap_or("-".into()),
                 share(Question::Cold),
                 share(Question::Warm)
             );
