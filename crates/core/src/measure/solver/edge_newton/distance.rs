@@ -47,9 +47,21 @@ const UNLIKE: f64 = 0.1;
 /// active set. `cut_bodies_agree_with_the_general_search` counts what is solved.
 pub(super) const VIOLATED: f64 = 1e-13;
 
-/// Curvature times size, dimensionless, that counts as none: far below what any body has, it only
-/// bounds steps between two flat sides. It changes time only; no test pins it.
-const FLATTEST: f64 = 1e-20;
+/// Curvature times size, dimensionless, that is added where there is none: far below what any body
+/// has, it only bounds steps between two flat sides. It changes time only; no test pins it.
+const FLATTEST: f64 = 1e-10;
+
+/// Rounding of the curvature that B's freedom to follow leaves of the distance, relative to the
+/// inverse of that; dimensionless. Added, so that none is left below 0.
+///
+/// Smaller, steps between flat sides fail for want of a minimum; larger, they are shorter than
+/// need be. It changes time only; no test pins it.
+const FREEDOM_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// Distance of the points, relative to the smaller body, that a step is made for where it fails for
+/// the distance they have: near contact a small one lets the points turn the normal too far. It
+/// changes time only; no test pins it.
+const BLUNT_DISTANCE: f64 = 0.05;
 
 /// Least distance of the points that a step is made for, relative to the smaller body: nearer, the
 /// turn of their difference is lost in rounding. Double-double arithmetic goes on from there, so
@@ -211,7 +223,7 @@ impl Solver<'_> {
         linear_a.fill(simd, of_a.iter(), (&of_a.active, &of_a.hessian), &local_a);
         linear_b.fill(simd, of_b.iter(), (&of_b.active, &of_b.hessian), &local_b);
         let difference = apply::<S, f64>(&frame, subtract::<S, f64>(of_a.point, y));
-        let Found { step, active } = self.step(simd, &linear_a, &linear_b, difference)?;
+        let Found { step, active } = self.step(simd, &linear_a, &linear_b, (difference, LEAST_DISTANCE))?;
         if !step.within(simd, self.limits) {
             return None;
         }
@@ -279,7 +291,7 @@ impl Solver<'_> {
             let (bent_a, bent_b) = (active_a.sum(simd, &of_a).hessian, active_b.sum(simd, &of_b).hessian);
             linear_a.fill(simd, of_a.iter(), (active_a, &bent_a), &local_a);
             linear_b.fill(simd, of_b.iter(), (active_b, &bent_b), &local_b);
-            let Some(mut found) = self.step(simd, &linear_a, &linear_b, difference) else {
+            let Some(mut found) = self.step_near_contact(simd, &linear_a, &linear_b, difference) else {
                 return Err(Lost::after(*rounds));
             };
             let prospect = Prospect::new(simd, &self.relation, &found.step, difference[2], self.limits);
@@ -328,12 +340,36 @@ impl Solver<'_> {
         Err(Lost::after(*rounds))
     }
 
-    /// Newton's step from points with `difference = x - y` in the basis; none if the quadratic
-    /// programs have no minimiser.
+    /// Newton's step from points with `difference = x - y` in the basis, or where it fails one that
+    /// turns the normal by less.
     #[inline(always)]
-    fn step<S: Simd>(&self, simd: S, a: &Linearized, b: &Linearized, difference: V3<f64>) -> Option<Found> {
+    fn step_near_contact<S: Simd>(
+        &self,
+        simd: S,
+        a: &Linearized,
+        b: &Linearized,
+        difference: V3<f64>,
+    ) -> Option<Found> {
+        for least in [LEAST_DISTANCE, BLUNT_DISTANCE] {
+            if let Some(found) = self.step(simd, a, b, (difference, least)) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    /// Newton's step from points with `difference = x - y` in the basis, for a distance of at least
+    /// so much, relative to the smaller body; none if the quadratic programs have no minimiser.
+    #[inline(always)]
+    fn step<S: Simd>(
+        &self,
+        simd: S,
+        a: &Linearized,
+        b: &Linearized,
+        (difference, least): (V3<f64>, f64),
+    ) -> Option<Found> {
         let [size_a, size_b] = self.limits;
-        let least = LEAST_DISTANCE * size_a.min(size_b);
+        let least = least * size_a.min(size_b);
         let mut distance = (difference[2] + a.shift() - b.shift()).max(least);
         let tau = [difference[0], difference[1]];
         let (mut active_a, mut active_b) = (a.active, b.active);
@@ -353,7 +389,7 @@ impl Solver<'_> {
             hessian_a[1] += k[1];
             hessian_a[3] += k[2];
             let pull = [(tau[0] - y_at_rest[0]) * inverse, (tau[1] - y_at_rest[1]) * inverse, 1.0];
-            let of_a = (VIOLATED * size_a, FLATTEST / size_a);
+            let of_a = (VIOLATED * size_a, FLATTEST / size_a + FREEDOM_ROUNDING * inverse);
             let found = minimize(simd, (&hessian_a, pull), a.rows(), active_a, of_a)?;
             let dx = found.step;
             active_a = found.active;
