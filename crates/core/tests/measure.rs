@@ -2,9 +2,14 @@
 //! allocation.
 
 use nalgebra::Vector3;
-use sublevel_core::body::Body;
-use sublevel_core::measure::{Distance, Options, Pose, Status, WarmStart, distance, distance_batch, level_distance};
+use sublevel_core::body::{Body, Compound};
+use sublevel_core::measure::{
+    Capsule, Distance, HalfSpace, Options, Pose, Ray, Status, WarmStart, cast_ray, distance, distance_batch,
+    distance_of_capsules, distance_to_capsule, distance_to_half_space, distance_to_point, growth_distance,
+    level_distance, nearer_than, overlap, overlap_with_capsule, signed_distance,
+};
 use sublevel_testkit::Seeded;
+use sublevel_testkit::bodies::{cut, cylinder};
 
 /// Chair and human at degrees 2, 4 and 6.
 fn fitted() -> Vec<(&'static Body, &'static Body)> {
@@ -128,5 +133,77 @@ fn a_solve_allocates_nothing() {
             distance_batch(chair, &pose_a, other, &poses, &Options::default(), &mut answers).expect("as many places");
         });
         assert_eq!(counted.count_total, 0, "batch, seed {seed}");
+    }
+}
+
+/// Neither do those of other measures and kinds of bodies, apart, near and in overlap.
+#[test]
+fn no_kind_of_query_allocates() {
+    let (chair, _) = fitted()[2];
+    let crate_ = || Body::cuboid("crate", Vector3::new(0.3, 0.2, 0.25)).unwrap();
+    let can = cylinder(0.25, 0.3);
+    let sliced = cut(0.3, 0.4, 0.2);
+    let bodies = [chair.clone(), crate_(), can.clone(), sliced.clone()];
+    let at = |body: &Body, x: f64| body.moved(&Default::default(), &Vector3::new(x, 0.0, 0.0)).unwrap();
+    let pile = Compound::new("pile", vec![crate_(), at(&can, 0.6), at(&sliced, -0.7), at(chair, 1.4)]).unwrap();
+    let capsule = Capsule::new(0.1, 0.3).unwrap();
+    let plane = HalfSpace::new(Vector3::z(), 0.0).unwrap();
+    let options = Options::default();
+    for seed in 0..40 {
+        let mut random = Seeded(4000 + seed);
+        let (pose_a, pose_b) = (random.pose(0.0), random.pose(0.1 + 0.04 * seed as f64));
+        let ray = Ray::new(*pose_b.translation(), random.unit(), 10.0).unwrap();
+        let counted = |name: &str, query: &mut dyn FnMut(&mut WarmStart)| {
+            let mut warm = WarmStart::default();
+            let counted = allocation_counter::measure(|| {
+                query(&mut warm);
+                query(&mut warm);
+            });
+            assert_eq!(counted.count_total, 0, "{name}, seed {seed}");
+        };
+        for a in &bodies {
+            let of_a = a.name();
+            for b in &bodies {
+                let name = |what: &str| format!("{what} of {of_a} and {}", b.name());
+                counted(&name("distance"), &mut |warm| {
+                    distance(a, &pose_a, b, &pose_b, &options, warm);
+                });
+                counted(&name("overlap"), &mut |warm| {
+                    overlap(a, &pose_a, b, &pose_b, &options, warm);
+                });
+                counted(&name("threshold"), &mut |warm| {
+                    nearer_than(a, &pose_a, b, &pose_b, 0.3, &options, warm).unwrap();
+                });
+                counted(&name("level distance"), &mut |warm| {
+                    level_distance(a, &pose_a, b, &pose_b, &options, warm);
+                });
+                counted(&name("growth distance"), &mut |warm| {
+                    growth_distance(a, &pose_a, b, &pose_b, &options, warm);
+                });
+                counted(&name("signed distance"), &mut |warm| {
+                    signed_distance(a, &pose_a, b, &pose_b, &options, warm);
+                });
+            }
+            counted(&format!("capsule and {of_a}"), &mut |warm| {
+                distance_to_capsule(a, &pose_a, &capsule, &pose_b, &options, warm);
+                overlap_with_capsule(a, &pose_a, &capsule, &pose_b, &options, warm);
+            });
+            counted(&format!("point and {of_a}"), &mut |warm| {
+                distance_to_point(a, &pose_a, pose_b.translation(), &options, warm).unwrap();
+            });
+            counted(&format!("half-space and {of_a}"), &mut |warm| {
+                distance_to_half_space(a, &pose_b, &plane, &options, warm);
+            });
+            counted(&format!("ray and {of_a}"), &mut |_| {
+                cast_ray(a, &pose_a, &ray, &options);
+            });
+            counted(&format!("pile and {of_a}"), &mut |warm| {
+                distance(&pile, &pose_a, a, &pose_b, &options, warm);
+                overlap(&pile, &pose_a, a, &pose_b, &options, warm);
+            });
+        }
+        counted("capsules", &mut |_| {
+            distance_of_capsules(&capsule, &pose_a, &capsule, &pose_b, &options);
+        });
     }
 }

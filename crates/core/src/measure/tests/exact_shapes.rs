@@ -233,19 +233,26 @@ fn boxes_side_by_side() {
     );
     for seed in 0..600 {
         let mut random = Seeded(seed);
-        let gaps = [[0.3, 0.0, 0.0], [0.0, 0.3, 0.4], [0.2, 0.3, 0.6], [0.0, 0.0, 0.0]][(seed % 4) as usize];
+        // Apart, and touching on a face, an edge and a corner.
+        let touching = (seed % 6).saturating_sub(2) as usize;
+        let gaps = [[0.3, 0.0, 0.0], [0.0, 0.3, 0.4], [0.2, 0.3, 0.6]].get(seed as usize % 6).unwrap_or(&[0.0; 3]);
         let sums = [1.5, 1.2, 0.9];
-        let place =
-            Vector3::from_fn(|i, _| if gaps[i] > 0.0 || seed % 4 == 3 && i == 0 { sums[i] + gaps[i] } else { 0.1 });
+        let place = Vector3::from_fn(|i, _| if gaps[i] > 0.0 || i < touching { sums[i] + gaps[i] } else { 0.1 });
         let tilt = [0.0, 1e-16, 1e-12, 1e-9, 1e-6][(seed % 5) as usize];
         let turn = UnitQuaternion::from_scaled_axis(random.unit() * tilt);
         let pose = Pose::from_quaternion(place, turn.coords.into()).unwrap();
         let found = distance(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut WarmStart::default());
-        let truth = Vector3::from(gaps).norm();
+        let truth = Vector3::from(*gaps).norm();
         let slack = 2.0 * tilt + 1e-12;
         let label = format!("seed {seed}, tilt {tilt:e}: {found:?} against {truth}");
         assert!(found.lower <= truth + slack && found.upper >= truth - slack, "{label}");
         assert!(found.upper - found.lower <= 1e-9, "{label}");
+        let decided = overlap(&a, &Pose::identity(), &b, &pose, &Options::default(), &mut WarmStart::default());
+        match decided {
+            Decision::Yes => assert!(truth == 0.0, "{label}"),
+            Decision::No => assert!(truth > 0.0 || tilt > 0.0, "{label}"),
+            Decision::Undecided { .. } => assert!(touching > 0, "{label}"),
+        }
     }
 }
 
