@@ -25,6 +25,7 @@ mod level;
 mod options;
 mod overlap;
 mod pairwise_minimum;
+mod parting_normals;
 mod penetration;
 mod point;
 mod signed;

@@ -5,7 +5,9 @@
 use super::culling::CULLING_SLACK;
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
-use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed};
+use crate::measure::frames::vector::{
+    M3, V3, add, apply, apply_symmetric, apply_transposed, cofactors, rows, times_transposed,
+};
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::Scalar;
 use nalgebra::Vector3;
@@ -38,9 +40,17 @@ impl<'a> Separation<'a> {
         Self { a, b, rotation: relative.rotation, between, error }
     }
 
-    /// From B's interior point to A's, metres.
-    pub(in crate::measure) fn between(&self) -> &Vector3<f64> {
-        &self.between
+    /// About the normal across the gap, from B to A, of some length: that of the ellipsoid of the
+    /// sum of both shapes, about B's interior point, through A's.
+    pub(in crate::measure) fn facing(&self) -> Vector3<f64> {
+        let of_a: M3<f64> = rows(Scalar, self.a.outline().shape());
+        let of_b: M3<f64> = rows(Scalar, self.b.outline().shape());
+        let turned = times_transposed::<Scalar, f64>(&self.rotation, &of_b);
+        let of_b = times_transposed::<Scalar, f64>(&turned, &self.rotation);
+        let entry = |i: usize, j: usize| of_a[i][j] + of_b[i][j];
+        let sum = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+        let (inverse, _) = cofactors(Scalar, sum);
+        apply_symmetric::<Scalar, f64>(&inverse, self.between.into()).into()
     }
 
     /// Lower bound of the distance, metres, by planes across n, which points from B to A; of any
@@ -51,6 +61,16 @@ impl<'a> Separation<'a> {
         let own_b = apply_transposed::<Scalar, f64>(&self.rotation, n.into()).into();
         n.dot(&self.between) - self.a.height(&-n) - self.b.height(&own_b) - self.error
     }
+}
+
+/// As [`Separation::facing`], of a body and a ball; `way` from the ball's centre to the body's
+/// interior point, body frame, metres.
+pub(in crate::measure) fn across_gap(body: &Body, radius: f64, way: &Vector3<f64>) -> Vector3<f64> {
+    let shape: M3<f64> = rows(Scalar, body.outline().shape());
+    let square = radius * radius;
+    let sum = [shape[0][0] + square, shape[0][1], shape[0][2], shape[1][1] + square, shape[1][2], shape[2][2] + square];
+    let (inverse, _) = cofactors(Scalar, sum);
+    apply_symmetric::<Scalar, f64>(&inverse, (*way).into()).into()
 }
 
 #[cfg(test)]

@@ -1,18 +1,38 @@
-//! Bounds of the signed distance of a body from a capsule by a ball and a plane: no polynomial is
+//! Bounds of the signed distance of a body from a capsule by balls and a plane: no polynomial is
 //! evaluated.
 
 use super::shape::Capsule;
 use crate::body::Body;
 use crate::measure::bounds::culling::{CULLING_SLACK, across};
+use crate::measure::bounds::separation::across_gap;
 use crate::measure::frames::pose::ROTATION_ERROR;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use nalgebra::Vector3;
 
-/// A bracket of the signed distance of a body from a capsule, metres: from above by the ball about
-/// the body's interior point, from below by the plane across the way to that point from the nearest
-/// one of the axis.
-pub(super) fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> [f64; 2] {
+/// A bracket of the signed distance of a body from a capsule, metres, as far as it may decide.
+pub(super) fn early_bounds(of_body: At<'_, Body>, of_capsule: At<'_, Capsule>, goal: &StopCriterion) -> [f64; 2] {
+    let lower = if runs(Stage::Balls) { ball_gap(of_body, of_capsule) } else { f64::NEG_INFINITY };
+    // A step of the closed form costs no more than a plane.
+    if lower > goal.far || of_body.0.closed_form().is_some() && runs(Stage::ClosedForm) {
+        return [lower, f64::INFINITY];
+    }
+    let [across, upper] = ball_and_plane(of_body, of_capsule);
+    [lower.max(across), upper]
+}
+
+/// Lower bound by the ball about the body and that about the capsule.
+fn ball_gap((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> f64 {
+    let ball = body.circumscribed();
+    let (_, apart, error) = across((pose, &ball.center), (capsule_pose, &Vector3::zeros()));
+    let reach = ball.radius + capsule.reach_m();
+    apart - reach - error - CULLING_SLACK * (apart + reach)
+}
+
+/// From above by the ball about the body's interior point, from below by a plane across the gap
+/// between the body and the place of the axis that is nearest to that point.
+fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> [f64; 2] {
     let (between, apart, error) = across((pose, body.interior_point()), (capsule_pose, &Vector3::zeros()));
     // Every point of the body is within its diameter of its interior point.
     let reach = 2.0 * body.circumscribed().radius + capsule.reach_m();
@@ -21,8 +41,12 @@ pub(super) fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose)
     let (half, radius) = (capsule.half_height_m(), capsule.radius_m());
     let way = between - axis * axis.dot(&between).clamp(-half, half);
     let upper = if runs(Stage::Balls) { way.norm() - body.in_radius() - radius + error } else { f64::INFINITY };
-    let Some(n) = way.try_normalize(0.0).filter(|_| runs(Stage::Planes)) else { return [f64::NEG_INFINITY, upper] };
+    if !runs(Stage::Planes) {
+        return [f64::NEG_INFINITY, upper];
+    }
+    let own_way = pose.rotation().inverse_transform_vector(&way);
+    let Some(own) = across_gap(body, radius, &own_way).try_normalize(0.0) else { return [f64::NEG_INFINITY, upper] };
+    let n = pose.transform_direction(&own);
     let of_capsule = half * axis.dot(&n).abs() + radius;
-    let of_body = body.height(&-pose.rotation().inverse_transform_vector(&n));
-    [n.dot(&between) - of_body - of_capsule - error, upper]
+    [n.dot(&between) - body.height(&-own) - of_capsule - error, upper]
 }

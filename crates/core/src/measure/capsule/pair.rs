@@ -3,7 +3,7 @@
 
 use super::answer::CapsuleDistance;
 use super::axes::{Axis, of_axes};
-use super::bounds::ball_and_plane;
+use super::bounds::early_bounds;
 use super::shape::Capsule;
 use crate::body::{Body, ClosedForm};
 use crate::measure::bounds::culling::{CULLING_SLACK, across};
@@ -32,6 +32,14 @@ const MAX_PLACES: u32 = 64;
 /// Smaller, pairs that rounding keeps wide take hundreds of iterations more and end no narrower;
 /// larger, they end wider than need be. Exercised by `family_13_parallel_flats_of_primitives`.
 const ROUNDING_FLOORS: [f64; 2] = [1e-13, 1e-12];
+
+/// Width of a bracket at a rounding floor, relative to the distance, dimensionless, beyond which the
+/// places along the axis are tried as well: they lose fewer digits near contact.
+///
+/// Larger, distances near contact are known less well than they might be; smaller, pairs farther
+/// apart take longer for digits that nobody asked for. Exercised by
+/// `family_09_size_ratio_of_primitives`.
+const FEW_DIGITS: f64 = 1e-3;
 
 /// Largest derivative of the distance along the axis, dimensionless, at a place that counts as the
 /// nearest one in its middle: gradients are off by about as much, and 1e-6 is promised.
@@ -70,7 +78,7 @@ impl Problem<'_> {
         let known = if self.goal.is_narrow() {
             [f64::NEG_INFINITY, f64::INFINITY]
         } else {
-            ball_and_plane(of_body, (self.capsule, self.capsule_pose))
+            early_bounds(of_body, (self.capsule, self.capsule_pose), &self.goal)
         };
         let found = if self.goal.met(known[0], known[1]) {
             CapsuleDistance { upper: f64::INFINITY, ..self.met(of_body.1.translation(), 0) }
@@ -100,13 +108,29 @@ impl Problem<'_> {
                 if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
                     *warm = *start;
                     match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
-                        Ok(found) => return CapsuleDistance { iterations: found.iterations + spent, ..found },
+                        Ok(found) => {
+                            let found = CapsuleDistance { iterations: found.iterations + spent, ..found };
+                            return self.with_more_digits(of_body, found);
+                        }
                         Err(more) => spent += more,
                     }
                 }
             }
         }
         self.along_axis(of_body, spent, warm)
+    }
+
+    /// The answer, near contact inside the bracket along the axis as well: both are proven.
+    fn with_more_digits(&self, of_body: At<'_, Body>, found: CapsuleDistance) -> CapsuleDistance {
+        let CapsuleDistance { lower, upper, iterations, .. } = found;
+        if !(lower.is_finite() && upper - lower > FEW_DIGITS * upper.abs()) || self.options.exhausted(iterations) {
+            return found;
+        }
+        let other = self.along_axis(of_body, iterations, &mut WarmStart::default());
+        let (lower, upper) = (lower.max(other.lower), upper.min(other.upper));
+        let attained = if other.upper < found.upper { other } else { found };
+        let status = Status::of(upper - lower <= self.tolerance);
+        CapsuleDistance { status, lower, upper, iterations: other.iterations, ..attained }
     }
 
     /// What rounding of coordinates grows with, metres: the larger of both and how far they are
@@ -144,16 +168,6 @@ impl Problem<'_> {
         }
     }
 
-    /// What the distance from the axis is asked for, with as much to spare as rounding may take.
-    fn goal_of_axis(&self) -> StopCriterion {
-        let (radius, StopCriterion { near, far }) = (self.capsule.radius_m(), self.goal);
-        let spare = |limit: f64| 4.0 * f64::EPSILON * (radius + limit.abs());
-        if self.goal.is_narrow() {
-            return self.goal;
-        }
-        StopCriterion { near: near + radius - spare(near), far: far + radius + spare(far) }
-    }
-
     /// Of a body with a single constraint.
     ///
     /// # Errors
@@ -165,7 +179,7 @@ impl Problem<'_> {
         warm: &mut WarmStart,
     ) -> Result<CapsuleDistance, u32> {
         let form_pose = self.capsule_pose;
-        let (form, goal) = (self.capsule.closed_form(), self.goal_of_axis());
+        let (form, goal) = (self.capsule.closed_form(), self.goal.beyond_radius(self.capsule.radius_m()));
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
         let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
@@ -197,7 +211,8 @@ impl Problem<'_> {
         (width, options): (f64, &Options<'_>),
         warm: &mut WarmStart,
     ) -> Result<CapsuleDistance, u32> {
-        let (form_pose, form, goal) = (self.capsule_pose, self.capsule.closed_form(), self.goal_of_axis());
+        let (form_pose, form, goal) =
+            (self.capsule_pose, self.capsule.closed_form(), self.goal.beyond_radius(self.capsule.radius_m()));
         let start = match &warm.hint {
             Hint::EdgeShape(trace) => EdgeShapeStart::Last(trace),
             Hint::Single { y, .. } => EdgeShapeStart::Witness(*y),
@@ -261,7 +276,7 @@ impl Problem<'_> {
         let (_, pose) = of_body;
         let form = self.capsule.closed_form();
         let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose.transform_point(x_a)) } else { None };
-        let found = between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), (width, options))?;
+        let found = between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), &self.goal, (width, options))?;
         let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;
         let x_a = pose.rotation().inverse_transform_vector(&(witness_a - pose.translation()));
         *warm = Hint::Shapes { x_a }.into();
@@ -391,7 +406,7 @@ impl Problem<'_> {
             let (bound, next) = Tangent::least(&ends, half);
             lower = bound.max(lower);
             let narrow = best.upper + radius - lower <= self.tolerance;
-            let met = self.goal_of_axis().met(lower, best.upper + radius);
+            let met = self.goal.beyond_radius(self.capsule.radius_m()).met(lower, best.upper + radius);
             if narrow && (!wants_normal || slant <= LEVEL || more == MORE_PLACES) || met || next == at {
                 break;
             }

@@ -211,7 +211,8 @@ impl<'a> Exact<'a> {
     }
 }
 
-/// The distance of two bodies that both have closed forms; none if one has not.
+/// The distance of two bodies that both have closed forms, or as much of it as the goal needs; none
+/// if one has not.
 ///
 /// # Errors
 /// After how many steps it is not proven.
@@ -219,7 +220,7 @@ impl<'a> Exact<'a> {
 pub(super) fn of_shapes(
     (a, pose_a): (&Body, &Pose),
     (b, pose_b): (&Body, &Pose),
-    options: &Options<'_>,
+    (goal, options): (&StopCriterion, &Options<'_>),
     warm: &mut WarmStart,
 ) -> Option<Result<Distance, u32>> {
     let (form_a, form_b) = (a.closed_form()?, b.closed_form()?);
@@ -229,7 +230,7 @@ pub(super) fn of_shapes(
     }
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose_a.transform_point(x_a)) } else { None };
-    let found = match between_shapes((form_a, pose_a), (form_b, pose_b), start.as_ref(), (tolerance, options)) {
+    let found = match between_shapes((form_a, pose_a), (form_b, pose_b), start.as_ref(), goal, (tolerance, options)) {
         Ok(found) => found,
         Err(steps) => return Some(Err(steps)),
     };

@@ -9,7 +9,7 @@ use super::planes::lower_by_planes;
 use super::query::Query;
 use super::search::Search;
 use crate::body::Body;
-use crate::measure::bounds::culling::{BallBounds, balls};
+use crate::measure::bounds::culling::{BallBounds, ball_gap, balls};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::vector::V3;
@@ -28,8 +28,8 @@ use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
-/// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is
-/// when they suffice.
+/// Distance of two bodies as far as the goal needs it, cheapest bounds first. When they suffice,
+/// `warm` keeps what it knows of witnesses, and else the normal of the planes.
 #[inline]
 pub(in crate::measure) fn settle(
     of_a: (&Body, &Pose),
@@ -43,9 +43,19 @@ pub(in crate::measure) fn settle(
     }
     if runs(Stage::ClosedForm)
         && let (Some(form_a), Some(form_b)) = (of_a.0.closed_form(), of_b.0.closed_form())
-        && let Some(found) = of_balls((form_a, of_a.1), (form_b, of_b.1), options)
     {
-        return found;
+        if let Some(found) = of_balls((form_a, of_a.1), (form_b, of_b.1), options) {
+            return found;
+        }
+        // The projection of a ball's centre costs no more than a plane.
+        if [form_a, form_b].iter().any(|form| form.shape().ball_radius_m().is_some()) {
+            let lower = if runs(Stage::Balls) { ball_gap(of_a, of_b).max(0.0) } else { 0.0 };
+            return if goal.met(lower, f64::INFINITY) {
+                parted(lower, 0)
+            } else {
+                between(of_a, of_b, goal, options, warm)
+            };
+        }
     }
     let BallBounds { lower, upper, witness_a, witness_b, normal } = balls(of_a, of_b);
     let mut bound = Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() };
@@ -60,8 +70,13 @@ pub(in crate::measure) fn settle(
         return found;
     }
     if runs(Stage::Planes) {
-        bound.lower = bound.lower.max(lower_by_planes(of_a, of_b, &warm.hint, goal));
+        let (lower, normal) = lower_by_planes(of_a, of_b, &warm.hint, goal);
+        bound.lower = bound.lower.max(lower);
         if goal.met(bound.lower, bound.upper) {
+            // What says more than a normal stays.
+            if let (Some(normal_a), Hint::Cold | Hint::Parting { .. }) = (normal, &warm.hint) {
+                warm.hint = Hint::Parting { normal_a };
+            }
             return bound;
         }
     }
@@ -117,7 +132,7 @@ impl<'a> Query<'a> {
     fn solve(&self, warm: &mut WarmStart) -> Distance {
         let Self { of_a, of_b, goal, options, .. } = *self;
         if runs(Stage::ClosedForm)
-            && let Some(found) = of_shapes(of_a, of_b, options, warm)
+            && let Some(found) = of_shapes(of_a, of_b, (goal, options), warm)
         {
             return match found {
                 Ok(found) => found,

@@ -28,6 +28,16 @@ impl StopCriterion {
         Self { near: self.near / unit, far: self.far / unit }
     }
 
+    /// What it asks of the distance of sets around whose points this radius counts, metres: with as
+    /// much to spare as its subtraction may round.
+    pub(in crate::measure) fn beyond_radius(&self, radius: f64) -> Self {
+        let spare = |limit: f64| 4.0 * f64::EPSILON * (radius + limit.abs());
+        if radius == 0.0 || self.is_narrow() {
+            return *self;
+        }
+        Self { near: self.near + radius - spare(self.near), far: self.far + radius + spare(self.far) }
+    }
+
     pub(in crate::measure) fn is_narrow(&self) -> bool {
         self.near == f64::NEG_INFINITY && self.far == f64::INFINITY
     }

@@ -62,6 +62,34 @@ fn the_closest_parts_count() {
     }
 }
 
+/// Along a motion past many near parts the normals of the last query spare searches, and change no
+/// answer beyond its bracket.
+#[test]
+fn other_parts_are_parted_by_their_last_normals() {
+    let (mut kept, mut forgotten) = (0, 0);
+    for seed in 0..24 {
+        let mut random = Seeded(7_000 + seed);
+        let (a, b) = (heap(&mut random, 8), heap(&mut random, 8));
+        let (pose_a, options) = (random_pose(&mut random, 1.0), Options::default());
+        let (away, step) = (random.unit() * 5.5, random.unit() * 0.02);
+        let mut warms = [WarmStart::default(); 2];
+        for k in 0..40 {
+            let place = pose_a.translation() + away + step * f64::from(k);
+            let pose_b = Pose::from_quaternion(place, [0.5, 0.5, -0.5, 0.5]).unwrap();
+            warms[1].parting = Default::default();
+            let [with, without] =
+                warms.each_mut().map(|warm| crate::measure::distance(&a, &pose_a, &b, &pose_b, &options, warm));
+            let label = format!("seed {seed} step {k}: {with:?} {without:?}");
+            assert!(with.lower <= without.upper && without.lower <= with.upper, "{label}");
+            assert_eq!(with.status, Status::Converged, "{label}");
+            kept += with.iterations;
+            forgotten += without.iterations;
+        }
+    }
+    println!("{kept} evaluations with normals of other parts, {forgotten} without");
+    assert!(3 * kept < 2 * forgotten, "{kept} of {forgotten}");
+}
+
 #[test]
 fn hints_of_other_solids_do_no_harm() {
     let (large, small) = (heap(&mut Seeded(1), 5), heap(&mut Seeded(2), 2));

@@ -11,6 +11,7 @@
 use super::projectable::Projectable;
 use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed, dot, normalized, scaled, subtract};
 use crate::measure::options::Options;
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{ALIGNED, TAYLOR_ROUNDING};
 use crate::polynomial::Scalar;
 
@@ -80,14 +81,15 @@ pub(super) enum Contact {
 }
 
 impl<A: Projectable, B: Projectable> ShapePair<A, B> {
-    /// From a point of A in its frame on until the bracket is as narrow as this, metres, or no step
-    /// is left.
-    pub(super) fn solve(&self, start: V3<f64>, tolerance: f64, options: &Options<'_>) -> ShapeProven {
-        self.solve_until(start, [tolerance, f64::INFINITY], options)
-    }
-
-    /// The same, or until they are known to be farther apart than `far` metres.
-    fn solve_until(&self, start: V3<f64>, [tolerance, far]: [f64; 2], options: &Options<'_>) -> ShapeProven {
+    /// From a point of A in its frame on until the goal is met, the bracket is as narrow as the
+    /// tolerance, metres, or no step is left.
+    pub(super) fn solve(
+        &self,
+        start: V3<f64>,
+        goal: &StopCriterion,
+        tolerance: f64,
+        options: &Options<'_>,
+    ) -> ShapeProven {
         let mut own = self.a.project(Scalar, start);
         let mut best = ShapeProven {
             lower: 0.0,
@@ -123,7 +125,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
                     (best.lower, best.n) = (lower.max(0.0), n);
                 }
             }
-            if best.lower > far {
+            if goal.met(best.lower, best.upper) {
                 break;
             }
             if best.upper - best.lower <= tolerance {
@@ -173,7 +175,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
         let by = 4.0 * self.displacement + MARGIN * size;
         let smaller = ShapePair { a: self.a.shrunk(by), b: self.b.shrunk(by), ..*self };
         // Making both smaller adds at most 2 √3 `by` to their distance.
-        let found = smaller.solve_until(start, [0.5 * by, 8.0 * by], options);
+        let found = smaller.solve(start, &StopCriterion::beyond(8.0 * by), 0.5 * by, options);
         // Points and segments have no inside: what is near them has to be in the other set.
         let (of_a, of_b) = (self.a.thinnest(), self.b.thinnest());
         let fits = |thinnest: f64| thinnest > 2.0 * by || thinnest == 0.0;

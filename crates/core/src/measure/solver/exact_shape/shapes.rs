@@ -10,6 +10,7 @@ use crate::body::{ClosedForm, ExactShape};
 use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
 use crate::measure::frames::vector::{V3, add_scaled, rows, subtract};
 use crate::measure::options::Options;
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::polynomial::{Scalar, gamma};
 use nalgebra::{Matrix3, Vector3};
 
@@ -35,41 +36,40 @@ pub(in crate::measure) struct ShapeDistance {
 /// A shape where it stands.
 pub(in crate::measure) type Placed<'a> = (&'a ClosedForm, &'a Pose);
 
-/// The distance, from a point of A on (world frame, metres).
+/// The distance, or as much of it as the criterion needs, from a point of A on (world frame,
+/// metres).
 ///
 /// # Errors
 /// After how many steps it is neither as narrow as the tolerance (metres) nor known to be that of
-/// an overlap.
+/// an overlap, nor the criterion met.
 pub(in crate::measure) fn between_shapes(
     of_a: Placed<'_>,
     of_b: Placed<'_>,
     start: Option<&Vector3<f64>>,
+    until: &StopCriterion,
     (tolerance, options): (f64, &Options<'_>),
 ) -> Result<ShapeDistance, u32> {
+    let in_order =
+        |of_a, of_b, start| Problem { of_a, of_b, start, tolerance, options, goal: Goal::Distance(*until) }.by_first();
     let is_ball = |form: &ClosedForm| form.shape().ball_radius_m().is_some();
     if is_ball(of_a.0) {
         // The projection of its centre is all there is to find.
-        return in_order(of_a, of_b, None, (tolerance, options));
+        return in_order(of_a, of_b, None);
     }
     match (*of_a.0.shape(), *of_b.0.shape()) {
         // The least over a box is found exactly, step by step.
         (ExactShape::Cylinder { .. } | ExactShape::Capsule { .. }, ExactShape::Cuboid { .. })
-        | (ExactShape::Capsule { .. }, ExactShape::Cylinder { .. }) => swapped(of_a, of_b, (tolerance, options)),
-        _ if is_ball(of_b.0) => swapped(of_a, of_b, (tolerance, options)),
-        _ => in_order(of_a, of_b, start, (tolerance, options)),
+        | (ExactShape::Capsule { .. }, ExactShape::Cylinder { .. }) => in_order(of_b, of_a, None).map(swapped),
+        _ if is_ball(of_b.0) => in_order(of_b, of_a, None).map(swapped),
+        _ => in_order(of_a, of_b, start),
     }
 }
 
-/// The distance with the second shape as the one that is moved over.
-fn swapped(
-    of_a: Placed<'_>,
-    of_b: Placed<'_>,
-    (tolerance, options): (f64, &Options<'_>),
-) -> Result<ShapeDistance, u32> {
-    let found = in_order(of_b, of_a, None, (tolerance, options))?;
+/// The distance of the shapes in the other order.
+fn swapped(found: ShapeDistance) -> ShapeDistance {
     let [first, second] = found.own_normals;
     let (witness_a, witness_b) = (found.witness_b, found.witness_a);
-    Ok(ShapeDistance { witness_a, witness_b, normal: -found.normal, own_normals: [second, first], ..found })
+    ShapeDistance { witness_a, witness_b, normal: -found.normal, own_normals: [second, first], ..found }
 }
 
 /// What is known of the contact of two shapes.
@@ -101,20 +101,11 @@ pub(in crate::measure) fn contact_of_shapes(
     Ok(if found.lower > 0.0 { ShapeContact::Apart(found.lower) } else { ShapeContact::Common(found.common) })
 }
 
-fn in_order(
-    of_a: Placed<'_>,
-    of_b: Placed<'_>,
-    start: Option<&Vector3<f64>>,
-    (tolerance, options): (f64, &Options<'_>),
-) -> Result<ShapeDistance, u32> {
-    Problem { of_a, of_b, start, tolerance, options, goal: Goal::Distance }.by_first()
-}
-
 /// What is asked of two shapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Goal {
-    /// Their distance.
-    Distance,
+    /// Their distance, or as much of it as the criterion needs.
+    Distance(StopCriterion),
     /// A point of both, or a lower bound of their distance above 0.
     Contact,
 }
@@ -205,15 +196,24 @@ impl Problem<'_> {
                 steps,
             }
         };
-        if self.goal == Goal::Contact {
+        let Goal::Distance(until) = self.goal else {
             return match pair.contact(own.into(), self.options) {
                 (Contact::Common(point), steps) => Ok(met(point, [0.0; 2], steps)),
                 (Contact::Apart(lower), steps) => Ok(met([0.0; 3], [lower, f64::INFINITY], steps)),
                 (Contact::Open, steps) => Err(steps),
             };
-        }
-        let found = pair.solve(own.into(), self.tolerance, self.options);
+        };
         let radius = radius_a + radius_b;
+        let until = until.beyond_radius(radius);
+        let found = pair.solve(own.into(), &until, self.tolerance, self.options);
+        let is_met = until.met(found.lower, found.upper);
+        if is_met && found.n == [0.0; 3] {
+            let upper = found.upper - radius + f64::EPSILON * (radius + found.upper);
+            return Ok(met(found.x, [f64::NEG_INFINITY, upper], found.steps));
+        }
+        if is_met {
+            return Ok(self.apart(&found, &rotation, (radius_a, radius_b)));
+        }
         if found.upper <= self.tolerance {
             // How deep radii reach beyond that is not known.
             if let (Contact::Common(point), _) = pair.contact(pair.own(found.x), self.options) {
