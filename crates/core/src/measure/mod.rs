@@ -25,7 +25,6 @@ mod level;
 mod options;
 mod overlap;
 mod pairwise_minimum;
-mod parting_normals;
 mod penetration;
 mod point;
 mod signed;

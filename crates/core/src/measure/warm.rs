@@ -2,7 +2,6 @@
 
 use crate::body::Body;
 use crate::measure::frames::query_frame::Pair;
-use crate::measure::parting_normals::PartingNormals;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
 use crate::measure::solver::edge_newton::{EdgeShapeTrace, EdgeTrace};
@@ -38,8 +37,6 @@ pub struct WarmStart {
     pub(super) hint: Hint,
     /// Which parts of the two solids it is about.
     pub(super) parts: (u16, u16),
-    /// Of other parts of the two solids.
-    pub(super) parting: PartingNormals,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -48,8 +45,6 @@ pub(super) enum Hint {
     Cold,
     /// As little, but that continuation from where the bodies face each other has diverged.
     Diverged,
-    /// Normal of any length, in A's frame, of planes that kept the bodies apart.
-    Parting { normal_a: Vector3<f64> },
     /// Witnesses in the frames of their own bodies, normal in A's frame.
     Apart { x_a: Vector3<f64>, y_b: Vector3<f64>, normal_a: Vector3<f64>, active_a: ActiveSet, active_b: ActiveSet },
     /// Witnesses on smooth parts of both surfaces, with how they answer motions.
@@ -100,10 +95,10 @@ impl Hint {
         Some([a.normalization().center + Vector3::from(x), b.normalization().center + Vector3::from(y)])
     }
 
-    /// Normal of the last answer, from B to A, in A's frame.
+    /// Unit normal of the last answer, from B to A, in A's frame.
     pub(super) fn normal_a(&self) -> Option<Vector3<f64>> {
         match self {
-            Self::Apart { normal_a, .. } | Self::Parting { normal_a } => Some(*normal_a),
+            Self::Apart { normal_a, .. } => Some(*normal_a),
             Self::Smooth(trace) => Some(trace.normal_a()),
             Self::Edges(trace) => Some(trace.normal_a()),
             _ => None,
@@ -113,6 +108,6 @@ impl Hint {
 
 impl From<Hint> for WarmStart {
     fn from(hint: Hint) -> Self {
-        Self { hint, ..Self::default() }
+        Self { hint, parts: (0, 0) }
     }
 }

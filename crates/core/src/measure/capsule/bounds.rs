@@ -14,8 +14,7 @@ use nalgebra::Vector3;
 /// A bracket of the signed distance of a body from a capsule, metres, as far as it may decide.
 pub(super) fn early_bounds(of_body: At<'_, Body>, of_capsule: At<'_, Capsule>, goal: &StopCriterion) -> [f64; 2] {
     let lower = if runs(Stage::Balls) { ball_gap(of_body, of_capsule) } else { f64::NEG_INFINITY };
-    // A step of the closed form costs no more than a plane.
-    if lower > goal.far || of_body.0.closed_form().is_some() && runs(Stage::ClosedForm) {
+    if lower > goal.far {
         return [lower, f64::INFINITY];
     }
     let [across, upper] = ball_and_plane(of_body, of_capsule);
@@ -31,7 +30,8 @@ fn ball_gap((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>
 }
 
 /// From above by the ball about the body's interior point, from below by a plane across the gap
-/// between the body and the place of the axis that is nearest to that point.
+/// between the body and the place of the axis that is nearest to that point: not of closed forms, of
+/// which a step costs no more than a plane.
 fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> [f64; 2] {
     let (between, apart, error) = across((pose, body.interior_point()), (capsule_pose, &Vector3::zeros()));
     // Every point of the body is within its diameter of its interior point.
@@ -41,7 +41,7 @@ fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Ca
     let (half, radius) = (capsule.half_height_m(), capsule.radius_m());
     let way = between - axis * axis.dot(&between).clamp(-half, half);
     let upper = if runs(Stage::Balls) { way.norm() - body.in_radius() - radius + error } else { f64::INFINITY };
-    if !runs(Stage::Planes) {
+    if body.closed_form().is_some() && runs(Stage::ClosedForm) || !runs(Stage::Planes) {
         return [f64::NEG_INFINITY, upper];
     }
     let own_way = pose.rotation().inverse_transform_vector(&way);

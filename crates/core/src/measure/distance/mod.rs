@@ -14,10 +14,9 @@ use crate::body::{Ball, Body, NodeContent, PartNode, PartTree, Solid};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, TreePair, nearest as nearest_parts};
-use crate::measure::parting_normals::PartingNormals;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
-use crate::measure::warm::{Hint, WarmStart};
+use crate::measure::warm::WarmStart;
 pub use answer::Distance;
 pub(super) use exact::Exact;
 pub(super) use pair::{between, nearest, settle};
@@ -88,24 +87,10 @@ fn closest(
     goal: &StopCriterion,
     (options, warm): (&Options<'_>, &mut WarmStart),
 ) -> Distance {
-    let (known, mut parting) = (warm.parting, PartingNormals::default());
-    let found = nearest_parts(balls, goal.near.max(0.0), warm, |parts, nearest, hint| {
-        let (i, j) = parts;
+    let found = nearest_parts(balls, goal.near.max(0.0), warm, |(i, j), nearest, hint| {
         let goal = StopCriterion { near: goal.near, far: goal.far.min(nearest) };
-        if hint.is_cold()
-            && let Some(normal_a) = known.of(parts)
-        {
-            hint.hint = Hint::Parting { normal_a };
-        }
-        let found = settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint);
-        if found.lower > 0.0
-            && let Some(normal_a) = hint.hint.normal_a()
-        {
-            parting.keep(parts, found.lower, normal_a);
-        }
-        found
+        settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
     });
-    warm.parting = parting;
     let tied = found.tied && found.best.normal.is_some();
     let parts = [found.parts.0 as u16, found.parts.1 as u16];
     Distance { lower: found.lower, parts, tied, iterations: found.iterations, ..found.best }

@@ -28,8 +28,8 @@ use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
-/// Distance of two bodies as far as the goal needs it, cheapest bounds first. When they suffice,
-/// `warm` keeps what it knows of witnesses, and else the normal of the planes.
+/// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is
+/// when they suffice.
 #[inline]
 pub(in crate::measure) fn settle(
     of_a: (&Body, &Pose),
@@ -70,13 +70,8 @@ pub(in crate::measure) fn settle(
         return found;
     }
     if runs(Stage::Planes) {
-        let (lower, normal) = lower_by_planes(of_a, of_b, &warm.hint, goal);
-        bound.lower = bound.lower.max(lower);
+        bound.lower = bound.lower.max(lower_by_planes(of_a, of_b, &warm.hint, goal));
         if goal.met(bound.lower, bound.upper) {
-            // What says more than a normal stays.
-            if let (Some(normal_a), Hint::Cold | Hint::Parting { .. }) = (normal, &warm.hint) {
-                warm.hint = Hint::Parting { normal_a };
-            }
             return bound;
         }
     }

@@ -17,19 +17,14 @@ const SETTLED: f64 = 0.02;
 /// The best lower bound of the distance, metres, or the first beyond which a goal asks for no more:
 /// across the normal of the last answer, about across the gap, or across the sides of a shape that
 /// the other body's centre lies beyond. Searches look across the gap as soon as they
-/// know where it is. With it comes its normal, of any length, from B to A in A's frame.
+/// know where it is.
 ///
 /// The last witnesses where they stand now bound what any plane can show: none is tried where they
 /// are too near for the goal, and none after that of the last normal where it is within
 /// [`SETTLED`] of them.
-pub(super) fn lower_by_planes(
-    of_a: (&Body, &Pose),
-    of_b: (&Body, &Pose),
-    hint: &Hint,
-    goal: &StopCriterion,
-) -> (f64, Option<Vector3<f64>>) {
+pub(super) fn lower_by_planes(of_a: (&Body, &Pose), of_b: (&Body, &Pose), hint: &Hint, goal: &StopCriterion) -> f64 {
     let ((a, pose_a), (b, pose_b)) = (of_a, of_b);
-    let mut best = (f64::NEG_INFINITY, None);
+    let mut best = f64::NEG_INFINITY;
     let forms = [b, a].map(Body::closed_form).map(|form| form.filter(|form| form.shape().ball_radius_m().is_none()));
     let last = hint.witnesses(a, b).zip(hint.normal_a());
     let apart = |[x, y]: [Vector3<f64>; 2]| (pose_a.transform_point(&x) - pose_b.transform_point(&y)).norm();
@@ -38,25 +33,16 @@ pub(super) fn lower_by_planes(
         return best;
     }
     let separation = Separation::new(of_a, of_b);
-    if let Hint::Parting { normal_a } = hint {
-        best = (separation.along(normal_a), Some(*normal_a));
-        if best.0 > goal.far {
-            return best;
-        }
-    }
     if let Some((apart, normal)) = last {
-        best = (separation.along(&normal), Some(normal));
+        best = separation.along(&normal);
         let settled = SETTLED * (a.circumscribed().radius + b.circumscribed().radius);
-        if best.0 > goal.far || apart - best.0 <= settled {
+        if best > goal.far || apart - best <= settled {
             return best;
         }
     }
     let mut meets = |n: &Vector3<f64>| {
-        let lower = separation.along(n);
-        if lower > best.0 {
-            best = (lower, Some(*n));
-        }
-        lower > goal.far
+        best = best.max(separation.along(n));
+        best > goal.far
     };
     if forms.iter().all(Option::is_none) {
         meets(&separation.facing());
