@@ -40,6 +40,11 @@ impl<'a> Separation<'a> {
         Self { a, b, rotation: relative.rotation, between, error }
     }
 
+    /// From B's interior point to A's, metres.
+    pub(in crate::measure) fn between(&self) -> &Vector3<f64> {
+        &self.between
+    }
+
     /// About the normal across the gap, from B to A, of some length: that of the ellipsoid of the
     /// sum of both shapes, about B's interior point, through A's.
     pub(in crate::measure) fn facing(&self) -> Vector3<f64> {

@@ -15,8 +15,8 @@ use nalgebra::Vector3;
 const SETTLED: f64 = 0.02;
 
 /// The best lower bound of the distance, metres, or the first beyond which a goal asks for no more:
-/// across the normal of the last answer, about across the gap, or across the sides of a shape that
-/// the other body's centre lies beyond. Searches look across the gap as soon as they
+/// across the normal of the last answer, along the line of the centres, about across the gap, or
+/// across the sides of a shape that the other body's centre lies beyond. Searches look across the gap as soon as they
 /// know where it is.
 ///
 /// The last witnesses where they stand now bound what any plane can show: none is tried where they
@@ -45,7 +45,9 @@ pub(super) fn lower_by_planes(of_a: (&Body, &Pose), of_b: (&Body, &Pose), hint: 
         best > goal.far
     };
     if forms.iter().all(Option::is_none) {
-        meets(&separation.facing());
+        if !meets(separation.between()) {
+            meets(&separation.facing());
+        }
         return best;
     }
     let both = forms.iter().all(Option::is_some);
