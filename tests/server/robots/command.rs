@@ -123,7 +123,7 @@ fn a_robot_is_fitted_within_its_gap_and_kept() {
     assert!(code == 1 && said.contains("link \"hand\"") && said.contains(&name), "{code} {said}");
     std::fs::write(body, &before).expect("written");
 
-    // Another gap, a degree and another mesh are fitted anew, and nothing is written over.
+    // Another gap, a degree and another mesh are fitted again, and nothing is written over.
     let finer = format!("{}", 0.5 * gap);
     let fine = files.load("crane.urdf", &["--max-gap", &finer]);
     let hand = row(&fine, "hand");

@@ -279,7 +279,7 @@ async fn a_certificate_of_something_else_is_refused_with_what_differs() {
     assert!(reason.contains("another robot"), "{reason}");
     client.delete_scene("cell").await.expect("deleted");
     cell(&client, &robot).await;
-    assert_eq!(holds().await, Ok(()), "the same scene made anew");
+    assert_eq!(holds().await, Ok(()), "the same scene made again");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -53,7 +53,7 @@ pub(super) fn bodies(
     Ok(Growth {
         axis: growth::BODY,
         what: format!(
-            "{} as a body of one constraint. Made of its numbers it is proven anew, and the table of its support heights is made; read from its \
+            "{} as a body of one constraint. Made of its numbers it is proven again, and the table of its support heights is made; read from its \
              file also every number of that is compared with the one that is made. Files do not hold the table: the text is what it would \
              add to them, and reading that comes before any proof.",
             subject.name
