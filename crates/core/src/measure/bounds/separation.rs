@@ -52,10 +52,7 @@ impl<'a> Separation<'a> {
         let of_b: M3<f64> = rows(Scalar, self.b.outline().shape());
         let turned = times_transposed::<Scalar, f64>(&self.rotation, &of_b);
         let of_b = times_transposed::<Scalar, f64>(&turned, &self.rotation);
-        let entry = |i: usize, j: usize| of_a[i][j] + of_b[i][j];
-        let sum = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
-        let (inverse, _) = cofactors(Scalar, sum);
-        apply_symmetric::<Scalar, f64>(&inverse, self.between.into()).into()
+        across_gap(|i, j| of_a[i][j] + of_b[i][j], &self.between)
     }
 
     /// Lower bound of the distance, metres, by planes across n, which points from B to A; of any
@@ -68,12 +65,11 @@ impl<'a> Separation<'a> {
     }
 }
 
-/// As [`Separation::facing`], of a body and a ball; `way` from the ball's centre to the body's
-/// interior point, body frame, metres.
-pub(in crate::measure) fn across_gap(body: &Body, radius: f64, way: &Vector3<f64>) -> Vector3<f64> {
-    let shape: M3<f64> = rows(Scalar, body.outline().shape());
-    let square = radius * radius;
-    let sum = [shape[0][0] + square, shape[0][1], shape[0][2], shape[1][1] + square, shape[1][2], shape[2][2] + square];
+/// About the normal across the gap between two centres, of some length: that of the ellipsoid of
+/// these entries through the way from the one to the other, metres.
+#[inline(always)]
+pub(in crate::measure) fn across_gap(entry: impl Fn(usize, usize) -> f64, way: &Vector3<f64>) -> Vector3<f64> {
+    let sum = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
     let (inverse, _) = cofactors(Scalar, sum);
     apply_symmetric::<Scalar, f64>(&inverse, (*way).into()).into()
 }

@@ -13,6 +13,11 @@ use nalgebra::Vector3;
 
 /// A bracket of the signed distance of a body from a capsule, metres, as far as it may decide.
 pub(super) fn early_bounds(of_body: At<'_, Body>, of_capsule: At<'_, Capsule>, goal: &StopCriterion) -> [f64; 2] {
+    let form = of_body.0.closed_form().filter(|_| runs(Stage::ClosedForm));
+    if form.is_some_and(|form| form.shape().ball_radius_m().is_some()) {
+        // The closed form of the axes costs no more than bounds.
+        return [f64::NEG_INFINITY, f64::INFINITY];
+    }
     let lower = if runs(Stage::Balls) { ball_gap(of_body, of_capsule) } else { f64::NEG_INFINITY };
     if lower > goal.far {
         return [lower, f64::INFINITY];
@@ -21,8 +26,8 @@ pub(super) fn early_bounds(of_body: At<'_, Body>, of_capsule: At<'_, Capsule>, g
     [lower.max(across), upper]
 }
 
-/// Lower bound by the ball about the body and that about the capsule.
-fn ball_gap((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> f64 {
+/// Lower bound by the ball about the body and that about the capsule, metres.
+pub(super) fn ball_gap((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> f64 {
     let ball = body.circumscribed();
     let (_, apart, error) = across((pose, &ball.center), (capsule_pose, &Vector3::zeros()));
     let reach = ball.radius + capsule.reach_m();
@@ -45,7 +50,9 @@ fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Ca
         return [f64::NEG_INFINITY, upper];
     }
     let own_way = pose.rotation().inverse_transform_vector(&way);
-    let Some(own) = across_gap(body, radius, &own_way).try_normalize(0.0) else { return [f64::NEG_INFINITY, upper] };
+    let shape = body.outline().shape();
+    let entry = |i, j| shape[(i, j)] + if i == j { radius * radius } else { 0.0 };
+    let Some(own) = across_gap(entry, &own_way).try_normalize(0.0) else { return [f64::NEG_INFINITY, upper] };
     let n = pose.transform_direction(&own);
     let of_capsule = half * axis.dot(&n).abs() + radius;
     [n.dot(&between) - body.height(&-own) - of_capsule - error, upper]

@@ -364,6 +364,7 @@ impl Problem<'_> {
         let pose = pose.with_translation(Vector3::zeros());
         let (axis, half) = (self.capsule_pose.transform_direction(&Vector3::z()), self.capsule.half_height_m());
         let radius = self.capsule.radius_m();
+        let goal_of_axis = self.goal.beyond_radius(radius);
         let wants_normal = self.goal.wants_answer();
         let projection = if wants_normal { Projection::new(body, &pose) } else { Projection::rough(body, &pose) };
         let projection = projection.without_newton();
@@ -406,7 +407,7 @@ impl Problem<'_> {
             let (bound, next) = Tangent::least(&ends, half);
             lower = bound.max(lower);
             let narrow = best.upper + radius - lower <= self.tolerance;
-            let met = self.goal.beyond_radius(self.capsule.radius_m()).met(lower, best.upper + radius);
+            let met = goal_of_axis.met(lower, best.upper + radius);
             if narrow && (!wants_normal || slant <= LEVEL || more == MORE_PLACES) || met || next == at {
                 break;
             }

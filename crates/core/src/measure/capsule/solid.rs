@@ -1,11 +1,10 @@
 //! The signed distance of a solid from a capsule: of all its parts the least.
 
 use super::answer::CapsuleDistance;
+use super::bounds::ball_gap;
 use super::pair::Problem;
 use super::shape::Capsule;
 use crate::body::Solid;
-use crate::measure::bounds::culling::CULLING_SLACK;
-use crate::measure::frames::pose::ROTATION_ERROR;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, least};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -26,13 +25,7 @@ pub(super) fn distance_until(
     if let [body] = parts {
         return problem.solve((body, pose), warm);
     }
-    let bound = |(i, _): (usize, usize)| {
-        let ball = parts[i].circumscribed();
-        let center = pose.transform_point(&ball.center);
-        let apart = (center - capsule_pose.translation()).norm();
-        let size = center.norm() + capsule_pose.translation().norm() + ball.radius + capsule.reach_m();
-        apart - ball.radius - capsule.reach_m() - (CULLING_SLACK + ROTATION_ERROR) * size
-    };
+    let bound = |(i, _): (usize, usize)| ball_gap((&parts[i], pose), (capsule, capsule_pose));
     let found =
         least((parts.len(), 1), bound, goal.near, warm, |(i, _), _, hint| problem.solve((&parts[i], pose), hint));
     let Least { best, lower, tied, iterations, .. } = found;

@@ -251,7 +251,7 @@ pub(super) fn of_shapes(
     }
     if normal == Vector3::zeros() {
         // So near that no direction is known.
-        return Some(Err(steps));
+        return Some(if goal.met(answer.lower, answer.upper) { Ok(answer) } else { Err(steps) });
     }
     let (active_a, active_b) = (active(form_a.shape(), of_a), active(form_b.shape(), of_b));
     Some(Ok(Distance { normal: Some(normal), active_a, active_b, ..answer }))

@@ -16,8 +16,8 @@ const SETTLED: f64 = 0.02;
 
 /// The best lower bound of the distance, metres, or the first beyond which a goal asks for no more:
 /// across the normal of the last answer, along the line of the centres, about across the gap, or
-/// across the sides of a shape that the other body's centre lies beyond. Searches look across the gap as soon as they
-/// know where it is.
+/// across the sides of a shape that the other body's centre lies beyond. Searches look across the
+/// gap as soon as they know where it is.
 ///
 /// The last witnesses where they stand now bound what any plane can show: none is tried where they
 /// are too near for the goal, and none after that of the last normal where it is within

@@ -256,6 +256,25 @@ fn boxes_side_by_side() {
     }
 }
 
+/// Shapes that overlap are nearer than any threshold, by their closed forms alone.
+#[test]
+fn thresholds_of_overlapping_shapes_are_decided() {
+    for seed in 0..200 {
+        let mut random = Seeded(74_000 + seed);
+        let shapes = [
+            Body::cuboid("box", Vector3::new(0.5, 0.3, 0.4)).unwrap(),
+            Body::cylinder("can", 0.4, 0.3).unwrap(),
+            Body::ball("ball", Vector3::zeros(), 0.3).unwrap(),
+        ];
+        let (a, b) = (&shapes[random.next() as usize % 3], &shapes[random.next() as usize % 3]);
+        let (pose_a, pose_b) = (random_pose(&mut random, 0.2), random_pose(&mut random, 0.2));
+        let decided = only(&[Stage::ClosedForm], || {
+            nearer_than(a, &pose_a, b, &pose_b, 0.1, &Options::default(), &mut WarmStart::default())
+        });
+        assert_eq!(decided, Ok(Decision::Yes), "seed {seed} {}-{}", a.name(), b.name());
+    }
+}
+
 /// Decisions near contact are right, and are those of the distance.
 #[test]
 fn contacts_of_shapes_are_decided() {
