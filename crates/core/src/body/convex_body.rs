@@ -15,7 +15,7 @@ use super::radial::{self, Volume};
 use super::support_bounds::{self, Extent, SupportProblem, TangentBound};
 use super::support_heights::{CornerBound, SupportGuess, SupportHeights};
 use super::support_table::Outline;
-use crate::polynomial::NotContaining;
+use crate::polynomial::{NotContaining, Scalar};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// How far a body reaches along a direction, body frame.
@@ -253,6 +253,15 @@ impl Body {
     /// Where the body reaches farthest, roughly.
     pub fn outline(&self) -> &Outline {
         &self.outline
+    }
+
+    /// About the point of the body that is farthest along a unit vector, by its outline; both in the
+    /// body frame, metres. Of bodies with edges one on the surface, with the constraint active there.
+    pub(crate) fn farthest_in_table(&self, n: &Vector3<f64>) -> (Vector3<f64>, usize) {
+        let n: [f64; 3] = (*n).into();
+        let cell = self.outline.cell::<_, f64>(Scalar, n);
+        let from_center = if self.is_smooth() { cell.farthest(Scalar, n) } else { cell.point };
+        (self.normalization.center + Vector3::from(from_center), self.outline.active(cell.place))
     }
 
     /// The shape that the body is, if its projection has a closed form: box, cylinder, ball.

@@ -58,6 +58,21 @@ pub struct Cell<N> {
     pub turn: [N; 6],
 }
 
+impl<N: Copy> Cell<N> {
+    /// About the point farthest along the unit vectors, from the centre of the normalization on,
+    /// body frame, metres.
+    #[inline(always)]
+    pub fn farthest<S: Simd>(&self, _: S, n: [N; 3]) -> [N; 3]
+    where
+        N: Number<S>,
+    {
+        let [xx, xy, xz, yy, yz, zz] = self.turn;
+        let row = |x: N, y: N, z: N| z.mul_add(n[2], y.mul_add(n[1], x * n[0]));
+        let turned = [row(xx, xy, xz), row(xy, yy, yz), row(xz, yz, zz)];
+        [self.point[0] + turned[0], self.point[1] + turned[1], self.point[2] + turned[2]]
+    }
+}
+
 /// The support points along the corners of the cells, face by face and row by row, with the
 /// constraints that are active there.
 pub(super) type Corners = Vec<(Vector3<f64>, Vec<usize>)>;
@@ -289,17 +304,16 @@ impl<'a> SupportTracer<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::Cell;
     use crate::body::Body;
     use crate::polynomial::{Lanes, Scalar, Simd, Vector, WithSimd, dispatch_lanes};
-    use nalgebra::{Matrix3, Vector3};
+    use nalgebra::Vector3;
     use sublevel_testkit::Seeded;
 
     /// `point + turn n`.
     fn support(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
-        let Cell { place, point, turn: [xx, xy, xz, yy, yz, zz] } = body.outline().cell::<_, f64>(Scalar, (*n).into());
-        assert_eq!(body.outline().active(place), 0);
-        Vector3::from(point) + Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) * n
+        let cell = body.outline().cell::<_, f64>(Scalar, (*n).into());
+        assert_eq!(body.outline().active(cell.place), 0);
+        Vector3::from(cell.farthest(Scalar, (*n).into()))
     }
 
     #[test]

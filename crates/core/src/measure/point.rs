@@ -263,7 +263,7 @@ impl<'a> Projection<'a> {
         let mut facing: Option<(f64, Vector3<f64>)> = None;
         let narrow = tolerance / unit;
         let in_metres = |bound: f64, side: f64| bound * unit * (1.0 + side * 4.0 * f64::EPSILON);
-        let problem = SingleProblem { body, objective: &objective, start, active };
+        let problem = SingleProblem { body, objective: &objective, start, active, narrow };
         let stop = |count| options.exhausted(spent + count);
         let (iterations, active) = solve_single(&problem, stop, |trial| {
             let (bound, n) = separation(body, &q, error, trial);

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 use sublevel_core::measure::{
-    Capsule, CapsuleDistance, Options, Pose, Status, Twist, distance_of_capsules, distance_to_capsule,
+    Capsule, CapsuleDistance, Options, Pose, Status, Twist, distance_of_capsule_to_half_space, distance_of_capsules,
+    distance_to_capsule,
 };
 
 use super::answer::{Answer, AnswerStatus};
@@ -121,37 +122,31 @@ impl Solver<'_> {
                 let found = distance_of_capsules(capsule, pose, &dot, &place, options);
                 SignedCapsule::of(&found, Some((pose, &place)))
             }
-            (Thing::Capsule { capsule, pose }, Thing::HalfSpace(half_space)) => above_plane(capsule, pose, half_space),
+            (Thing::Capsule { capsule, pose }, Thing::HalfSpace(half_space)) => {
+                above_plane(capsule, pose, half_space, options)
+            }
             _ => self.capsule_distance(&pair.swapped(), options).swapped(),
         }
     }
 }
 
 /// The signed distance of a capsule from a half-space: that of the lower end of its axis.
-fn above_plane(capsule: &Capsule, pose: &Pose, half_space: &WorldHalfSpace) -> SignedCapsule {
-    let (normal, offset) = (half_space.half_space.normal(), half_space.half_space.offset());
-    let axis = pose.transform_direction(&Vector3::z()) * capsule.half_height_m();
-    let slope = axis.dot(normal);
-    let end = pose.translation() - if slope > 0.0 { axis } else { -axis };
-    let height = normal.dot(&end) - offset - capsule.radius_m();
-    let size = pose.translation().norm() + capsule.reach_m();
-    let slack = half_space.slack_m(size) + 64.0 * f64::EPSILON * (size + offset.abs());
-    let witness = end - normal * capsule.radius_m();
-    let on_plane = witness - normal * height;
+fn above_plane(capsule: &Capsule, pose: &Pose, half_space: &WorldHalfSpace, options: &Options<'_>) -> SignedCapsule {
+    let plane = &half_space.half_space;
+    let found = distance_of_capsule_to_half_space(capsule, pose, plane, options);
+    let slack = half_space.slack_m(pose.translation().norm() + capsule.reach_m());
+    let (normal, witness) = (plane.normal(), found.witness);
+    let on_plane = witness - normal * (normal.dot(&witness) - plane.offset());
     let arm = witness - half_space.origin;
-    let gradients = [
-        Twist { linear: *normal, angular: (witness - pose.translation()).cross(normal) },
-        Twist { linear: -normal, angular: normal.cross(&arm) },
-    ];
+    let gradients = [found.pose_gradient(pose, plane), Twist { linear: -normal, angular: normal.cross(&arm) }];
     SignedCapsule {
-        status: Status::Converged,
-        lower: height - slack,
-        upper: height + slack,
+        status: found.status,
+        lower: found.lower - slack,
+        upper: found.upper + slack,
         witnesses: [witness, on_plane],
         normal: Some(*normal),
         gradients: Some(gradients),
-        // A segment along the plane has all of its points as near.
-        tied: capsule.half_height_m() > 0.0 && slope.abs() <= slack,
-        iterations: 0,
+        tied: found.tied,
+        iterations: found.iterations,
     }
 }

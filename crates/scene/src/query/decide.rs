@@ -62,11 +62,8 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
         (Thing::Solid { set: None, rungs, pose }, Thing::HalfSpace(half_space))
         | (Thing::HalfSpace(half_space), Thing::Solid { set: None, rungs, pose }) => {
             let Some(solid) = rungs.last() else { return Bracket::of(Verdict::Undecided, gap, f64::INFINITY) };
-            let found = solver.half_space_distance(solid, pose, half_space, (pair.slots, &options));
-            let ball = solid.circumscribed();
-            let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
-            let (lower, upper) = (found.lower - slack, found.upper + slack);
-            Bracket::of(compare::against(lower, upper, threshold), lower, upper)
+            let decision = solver.half_space_decision(solid, pose, half_space, threshold, (pair.slots, &options));
+            Bracket::decided(decision, threshold)
         }
         (Thing::Solid { set: None, rungs, pose }, Thing::Capsule { capsule, pose: capsule_pose })
             if threshold >= 0.0 =>

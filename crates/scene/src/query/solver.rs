@@ -1,7 +1,10 @@
 //! What solving a pair takes: the question, warm starts, and the pair where it stands.
 
-use sublevel_core::body::Shape;
-use sublevel_core::measure::{HalfSpaceDistance, Options, Pose, WarmStart, distance_to_half_space};
+use sublevel_core::body::{Shape, Solid};
+use sublevel_core::measure::{
+    Decision, HalfSpaceDistance, Options, Pose, WarmStart, distance_to_half_space, nearer_to_half_space_than,
+    overlap_with_half_space,
+};
 
 use super::ask::{Ask, Measure};
 use super::thing::{PairSlots, Thing, WorldHalfSpace};
@@ -76,6 +79,41 @@ impl Solver<'_> {
     ) -> HalfSpaceDistance {
         self.warm(slots, [0; 2], Measure::Signed, |warm| {
             distance_to_half_space(solid, pose, &half_space.half_space, options, warm)
+        })
+    }
+
+    /// Whether the signed distance of a solid from a half-space is below a threshold, metres, or at
+    /// most 0: for all planes within the error of where the half-space stands.
+    pub(crate) fn half_space_decision(
+        &self,
+        solid: &Shape,
+        pose: &Pose,
+        half_space: &WorldHalfSpace,
+        threshold: f64,
+        (slots, options): (Option<PairSlots>, &Options<'_>),
+    ) -> Decision {
+        let plane = &half_space.half_space;
+        let open = Decision::Undecided { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+        let ball = solid.circumscribed();
+        let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
+        self.warm(slots, [0; 2], Measure::Signed, |warm| {
+            let mut below = |threshold: f64| {
+                if threshold == 0.0 {
+                    return overlap_with_half_space(solid, pose, plane, options, warm);
+                }
+                // Only thresholds that are no numbers are refused.
+                nearer_to_half_space_than(solid, pose, plane, threshold, options, warm).unwrap_or(open)
+            };
+            if slack == 0.0 {
+                return below(threshold);
+            }
+            match below(threshold + slack) {
+                Decision::No => Decision::No,
+                _ => match below(threshold - slack) {
+                    Decision::No => open,
+                    other => other,
+                },
+            }
         })
     }
 }

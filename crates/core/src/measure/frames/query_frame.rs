@@ -423,23 +423,16 @@ impl<'a> Pair<'a> {
         self.rotation.transpose() * n
     }
 
-    /// Of the stored boundary points of the first body the one farthest along a direction of the
-    /// query frame.
-    pub(in crate::measure) fn farthest_a(&self, n: &Vector3<f64>) -> Vector3<f64> {
-        self.a_to_query(&farthest(self.a.body.boundary(), n))
+    /// About the point of the first body farthest along a unit vector of the query frame, by its
+    /// table, and the constraint active there.
+    pub(in crate::measure) fn farthest_a(&self, n: &Vector3<f64>) -> (Vector3<f64>, usize) {
+        let (point, active) = self.a.body.farthest_in_table(n);
+        (self.a_to_query(&point), active)
     }
 
     /// The same of the second body.
-    pub(in crate::measure) fn farthest_b(&self, n: &Vector3<f64>) -> Vector3<f64> {
-        self.b_to_query(&farthest(self.b.body.boundary(), &self.direction_to_b(n)))
+    pub(in crate::measure) fn farthest_b(&self, n: &Vector3<f64>) -> (Vector3<f64>, usize) {
+        let (point, active) = self.b.body.farthest_in_table(&self.direction_to_b(n));
+        (self.b_to_query(&point), active)
     }
-}
-
-fn farthest(points: &[Vector3<f64>], n: &Vector3<f64>) -> Vector3<f64> {
-    let first = (f64::NEG_INFINITY, Vector3::zeros());
-    let (_, point) = points.iter().fold(first, |best, point| {
-        let height = point.dot(n);
-        if height > best.0 { (height, *point) } else { best }
-    });
-    point
 }

@@ -40,25 +40,6 @@ impl Program<6> for Closest<'_> {
     }
 }
 
-/// `max n·x` over one body.
-pub(in crate::measure) struct Support<'a> {
-    pub(in crate::measure) body: &'a Posed<'a>,
-    pub(in crate::measure) n: Vector3<f64>,
-}
-
-impl Program<3> for Support<'_> {
-    fn objective(&self, _: &Vector3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
-        (-self.n, Matrix3::zeros())
-    }
-
-    fn constraints(&self, v: &Vector3<f64>, rows: &mut Rows<3>) {
-        for i in 0..self.body.len() {
-            let jet = self.body.jet(i, v);
-            rows.push(Row { value: jet.value - 1.0, gradient: jet.gradient, hessian: jet.hessian, block: 0 });
-        }
-    }
-}
-
 /// A point strictly inside, most of the way from the inner point `center` along the unit vector u
 /// to the boundary, where a body is curved; flat starts show a method nothing.
 pub(in crate::measure) fn near_boundary(body: &Posed<'_>, center: &Vector3<f64>, u: &Vector3<f64>) -> Vector3<f64> {

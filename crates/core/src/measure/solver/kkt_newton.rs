@@ -203,12 +203,7 @@ impl Active {
         (rest.norm(), gap)
     }
 
-    /// The most violated constraint that is not in the set, if violated by more than [`VIOLATED`].
-    pub(in crate::measure) fn violated(&self, body: &Posed<'_>, v: &Vector3<f64>, level: f64) -> Option<usize> {
-        self.violated_by(VIOLATED * level.abs().max(1.0), body, v, level)
-    }
-
-    /// The same if violated by more than `excess`.
+    /// The most violated constraint that is not in the set, if violated by more than `excess`.
     pub(in crate::measure) fn violated_by(
         &self,
         excess: f64,

@@ -30,6 +30,7 @@ pub(super) mod refinement;
 pub(super) mod stages;
 pub(super) mod step_acceleration;
 pub(super) mod stop_criterion;
+pub(super) mod support_point;
 pub(super) mod support_table_gjk;
 pub(super) mod tangent_newton;
 pub(super) mod two_point_problem;

@@ -156,8 +156,8 @@ pub(in crate::measure) struct Trial {
 /// Most steps of [`solve_single`] before, and after each iterate of, the interior-point method.
 const MAX_STEPS: u32 = 12;
 
-/// Longest step, in query units, after which a bracket may be narrow: what remains is about its
-/// square.
+/// Longest step, in query units, after which a bracket of a fraction of its square may be narrow:
+/// it is as long where more is asked for.
 ///
 /// Larger, brackets are computed that stay wide; smaller, a step more is taken. It changes time
 /// only; no test pins it.
@@ -171,6 +171,8 @@ pub(in crate::measure) struct SingleProblem<'a> {
     pub(in crate::measure) start: Vector3<f64>,
     /// None, if nothing is known.
     pub(in crate::measure) active: ActiveSet,
+    /// Width of the bracket asked for, query units.
+    pub(in crate::measure) narrow: f64,
 }
 
 /// What a trial point is worth.
@@ -195,11 +197,12 @@ const MORE_STEPS: u32 = 3;
 /// Minimises until `judge` has all that it asks for; returns the iterations and the constraints
 /// that were active last.
 pub(in crate::measure) fn solve_single(
-    &SingleProblem { body, objective, start, active }: &SingleProblem<'_>,
+    &SingleProblem { body, objective, start, active, narrow }: &SingleProblem<'_>,
     mut exhausted: impl FnMut(u32) -> bool,
     mut judge: impl FnMut(&Trial) -> Worth,
 ) -> (u32, ActiveSet) {
-    let mut steps = Steps { body, objective, active, narrow: 0 };
+    let worth = WORTH_A_BRACKET.max(narrow.sqrt());
+    let mut steps = Steps { body, objective, active, worth, narrow: 0 };
     let mut count = 0;
     if steps.run(start, &mut count, &mut exhausted, &mut judge) {
         return (count, steps.active);
@@ -239,6 +242,8 @@ struct Steps<'a> {
     body: &'a Posed<'a>,
     objective: &'a Objective,
     active: ActiveSet,
+    /// Longest step after which a bracket is computed.
+    worth: f64,
     /// Trial points since the bracket was narrow.
     narrow: u32,
 }
@@ -267,7 +272,7 @@ impl Steps<'_> {
             let jets = &jets[..self.body.len()];
             if step > 0 {
                 let dual_gradient = jets.iter().zip(&multipliers).map(|(jet, m)| jet.gradient * *m).sum();
-                if last < WORTH_A_BRACKET || step % 4 == 0 {
+                if last < self.worth || step % 4 == 0 {
                     let worth = judge(&Trial { y, multipliers, dual_gradient });
                     self.narrow += u32::from(worth == Worth::Narrow);
                     if worth == Worth::Done || self.narrow > MORE_STEPS {

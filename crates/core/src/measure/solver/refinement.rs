@@ -1,6 +1,6 @@
 //! Brackets where doubles end: points, multipliers and bounds in double-double arithmetic.
 //!
-//! Rounding leaves the brackets of [`crate::measure::bracket`] some hundred epsilon of the larger
+//! Rounding leaves the brackets of `bounds/duality_bounds` some hundred epsilon of the larger
 //! body wide, and those of level distances over needles that times the slope of the needle's
 //! polynomial. Where that is too wide, Newton's method goes on with residuals of twice the
 //! precision (iterative refinement), and the same inequalities are evaluated there. Rounding then

@@ -41,12 +41,8 @@ pub(in crate::measure) enum Stage {
     DirectionSampling,
     /// Search around a direction for a better one, where edges stop Newton's method.
     CompassSearch,
-    /// Support points by Newton's method, several at once.
+    /// Support points by Newton's method with one active constraint, several at once or one.
     SupportLanes,
-    /// Support points by Newton's method, one by one.
-    SupportNewton,
-    /// Support points by an interior-point method.
-    SupportInterior,
     /// The distances of single points of a capsule's axis.
     AlongAxis,
     /// Sequential quadratic programming over one body.

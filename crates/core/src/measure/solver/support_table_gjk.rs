@@ -1,11 +1,8 @@
 //! About where two bodies are nearest, by the support points that their outlines keep. Nothing is
 //! proven by it; it shows Newton's method where to begin and which constraints are active.
 
-use crate::body::Body;
 use crate::measure::frames::query_frame::Pair;
-use crate::measure::frames::vector::{V3, apply_symmetric};
 use crate::optimize::{Approach, Corner, gjk};
-use crate::polynomial::Scalar;
 use nalgebra::Vector3;
 
 /// Square of the distance, relative to the smaller body, dimensionless, that counts as none: a
@@ -17,21 +14,7 @@ const NONE: f64 = 1e-6;
 
 /// Points of the outlines of A farthest along -n and of B farthest along n, query frame.
 pub(in crate::measure) fn corners(pair: &Pair<'_>, n: &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    (pair.a_to_query(&farthest(pair.a.body, &-n)), farthest_b(pair, n))
-}
-
-/// Point of B's outline farthest along n, query frame.
-fn farthest_b(pair: &Pair<'_>, n: &Vector3<f64>) -> Vector3<f64> {
-    pair.b_to_query(&farthest(pair.b.body, &pair.direction_to_b(n)))
-}
-
-/// Point of a body's outline farthest along n, both in the body's frame: of bodies with edges one
-/// on the surface.
-fn farthest(body: &Body, n: &Vector3<f64>) -> Vector3<f64> {
-    let n: V3<f64> = (*n).into();
-    let cell = body.outline().cell::<_, f64>(Scalar, n);
-    let turned = if body.is_smooth() { apply_symmetric::<Scalar, f64>(&cell.turn, n) } else { [0.0; 3] };
-    body.normalization().center + Vector3::from(cell.point) + Vector3::from(turned)
+    (pair.farthest_a(&-n).0, pair.farthest_b(n).0)
 }
 
 /// The approach of two bodies, from a direction from B to A on.
@@ -48,7 +31,7 @@ pub(in crate::measure) fn approach(pair: &Pair<'_>, n: &Vector3<f64>) -> Approac
 /// the unit vector from there to it in those coordinates.
 pub(in crate::measure) fn lowest(pair: &Pair<'_>) -> Approach {
     let support = |n: &Vector3<f64>| {
-        let point = farthest_b(pair, &-pair.a.pulled_back(n));
+        let (point, _) = pair.farthest_b(&-pair.a.pulled_back(n));
         Corner { x: point, y: point, difference: pair.a.normalized(&(point - pair.a.interior)) }
     };
     let first = pair.a.normalized(&(pair.b.interior - pair.a.interior));

@@ -6,13 +6,12 @@ use super::options::ImpactOptions;
 use crate::body::Body;
 use crate::measure::distance::{Distance, between};
 use crate::measure::frames::motion::Motion;
-use crate::measure::frames::pose::ROTATION_ERROR;
-use crate::measure::half_space::Support;
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
-use crate::measure::solver::projection::Single;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::warm::{Hint, WarmStart};
+use crate::measure::solver::support_point::{Asked, SupportPoint, height};
+use crate::measure::warm::WarmStart;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
@@ -80,11 +79,10 @@ impl Moving<'_> {
         self.motion.error(t, ball.center.norm() + ball.radius)
     }
 
-    /// Witness of a distance as the hint for a support, in the body frame.
-    fn hint(&self, t: f64, witness: &Vector3<f64>) -> WarmStart {
+    /// Witness of a distance as a start for a support point, in the body frame.
+    fn known(&self, t: f64, witness: &Vector3<f64>) -> SupportPoint {
         let pose = self.motion.pose(t);
-        let y = pose.rotation().inverse_transform_vector(&(witness - pose.translation()));
-        Hint::Single { y, active: 0 }.into()
+        SupportPoint { x: pose.rotation().inverse_transform_vector(&(witness - pose.translation())), active: 0 }
     }
 }
 
@@ -202,19 +200,24 @@ impl Search<'_> {
         self.queries += 1;
         let options = self.options();
         let (pose_a, pose_b) = (self.a.motion.pose(t), self.b.motion.pose(t));
-        let (a, b) = (Single::new(self.a.body, &pose_a), Single::new(self.b.body, &pose_b));
         let narrow = 0.05 * self.contact;
-        let mut warm = [self.a.hint(from, &found.witness_a), self.b.hint(from, &found.witness_b)];
-        let low = Support::new(&a, &-n).solve(narrow / a.unit, &options, &mut warm[0]);
-        let high = Support::new(&b, n).solve(narrow / b.unit, &options, &mut warm[1]);
-        // n·x over A is that of its query origin less the support of -n; differences first, however
-        // far from the origin.
-        let [arm_a, arm_b] = [(&a, &pose_a), (&b, &pose_b)]
-            .map(|(single, pose)| pose.transform_direction(&single.to_body(&Vector3::zeros())));
+        let of = |moving: &Moving<'_>, pose: &Pose, n: &Vector3<f64>, witness| {
+            let own = pose.rotation().inverse_transform_vector(n);
+            height(moving.body, &own, Asked::within(narrow), Some(moving.known(from, witness)), &options).upper
+        };
+        let low = of(&self.a, &pose_a, &-n, &found.witness_a);
+        let high = of(&self.b, &pose_b, n, &found.witness_b);
+        // Differences first, however far from the origin.
+        let [arm_a, arm_b] = [(&self.a, &pose_a), (&self.b, &pose_b)]
+            .map(|(moving, pose)| pose.transform_direction(&moving.body.normalization().center));
         let offset = (pose_a.translation() - pose_b.translation()) + (arm_a - arm_b);
-        let size = offset.norm() + 2.0 * (arm_a.norm() + arm_b.norm()) + 2.0 * (a.unit + b.unit);
-        let slack = (ROTATION_ERROR + gamma(16) + error) * size;
-        n.dot(&offset) - low.upper * a.unit - high.upper * b.unit - slack - self.errors(t)
+        let size = offset.norm() + 2.0 * (arm_a.norm() + arm_b.norm()) + low.abs() + high.abs();
+        let reach = |moving: &Moving<'_>| {
+            let ball = moving.body.circumscribed();
+            ball.radius + (ball.center - moving.body.normalization().center).norm()
+        };
+        let slack = (ROTATION_ERROR + gamma(16) + error) * (size + reach(&self.a) + reach(&self.b));
+        n.dot(&offset) - low - high - slack - self.errors(t)
     }
 
     /// Whether the circumscribed balls are proven apart all the time, by the plane between them.

@@ -1,6 +1,5 @@
 //! The shortest known translation that takes overlapping bodies apart.
 
-use super::support::{SupportPoint, support};
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, DualTrial, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
@@ -9,6 +8,7 @@ use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
 use crate::measure::solver::kkt_newton::{AT, Active, DistanceNewton};
 use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::support_point::{SupportPoint, support_of_a, support_of_b};
 use crate::measure::solver::two_point_problem::Through;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
@@ -240,8 +240,8 @@ impl<'a> Best<'a> {
             let mut around = [(f64::INFINITY, n, SupportPoint::NONE, SupportPoint::NONE); 4];
             for (found, tangent) in around.iter_mut().zip([needle, -needle, n.cross(&needle), -n.cross(&needle)]) {
                 let turned = (n + tangent * step).normalize();
-                let a = support(&pair.a, &-turned, enough, None, || pair.farthest_a(&-turned));
-                let b = support(&pair.b, &turned, enough, None, || pair.farthest_b(&turned));
+                let a = support_of_a(pair, &-turned, enough, None);
+                let b = support_of_b(pair, &turned, enough, None);
                 let (Some(a), Some(b)) = (a, b) else { return };
                 *found = (turned.dot(&(b.x - a.x)), turned, a, b);
             }

@@ -5,6 +5,4 @@ pub(in crate::measure) mod local_search;
 pub(in crate::measure) mod sweep;
 
 mod direction_sampling;
-mod farthest;
 mod sphere_branch_and_bound;
-mod support;

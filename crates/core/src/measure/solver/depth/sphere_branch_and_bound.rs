@@ -18,7 +18,7 @@
 //! ends are equal. So triangles become narrow across the great circles where a flat face or a long
 //! edge makes the support point jump, and stay long along them.
 
-use super::support::SupportPoint;
+use crate::measure::solver::support_point::SupportPoint;
 use nalgebra::{Matrix3, Vector3};
 
 /// A direction with the support points of A along -n and of B along n.

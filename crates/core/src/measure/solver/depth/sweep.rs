@@ -11,14 +11,13 @@
 //! directions are equally good, as for concentric balls, all of them are.
 
 use super::direction_sampling::Scout;
-use super::farthest::{Farthest, Sought};
 use super::local_search::{Best, ELSEWHERE, tolerance};
 use super::sphere_branch_and_bound::{Cell, Covering, Direction};
-use super::support::{SupportPoint, support};
 use crate::measure::bounds::duality_bounds::DUALITY_ROUNDING;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::support_point::{Farthest, Sought, SupportPoint, support_of_a, support_of_b};
 use crate::polynomial::{MAX_LANES, dispatch};
 use nalgebra::Vector3;
 
@@ -224,14 +223,14 @@ impl<const N: usize> Sweep<'_, N> {
             Some((x, active)) => SupportPoint { x: to_a(&x), active: 1 << active },
             None => {
                 let start = ends.map(|[p, q]| between_points(a, &p.a, &q.a, &-n));
-                support(a, &-n, tolerance, start, || pair.farthest_a(&-n))?
+                support_of_a(pair, &-n, tolerance, start)?
             }
         };
         let b = match of_b {
             Some((y, active)) => SupportPoint { x: to_b(&y), active: 1 << active },
             None => {
                 let start = ends.map(|[p, q]| between_points(b, &p.b, &q.b, &n));
-                support(b, &n, tolerance, start, || pair.farthest_b(&n))?
+                support_of_b(pair, &n, tolerance, start)?
             }
         };
         self.error = self.error.max(pair.a.displacement(&a.x) + pair.b.displacement(&b.x));

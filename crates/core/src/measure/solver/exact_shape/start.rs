@@ -185,8 +185,8 @@ fn on_the_ellipsoid<S: Simd, P: Projectable>(
 fn farthest<S: Simd>(simd: S, body: &Body, relative: &Relative<f64>, n: V3<f64>) -> (V3<f64>, [f64; 6]) {
     let own = scaled::<S, f64>(apply_transposed::<S, f64>(&relative.rotation, n), -1.0);
     let cell = body.outline().cell::<S, f64>(simd, own);
-    let point = add::<S, f64>(cell.point, apply_symmetric::<S, f64>(&cell.turn, own));
-    (add::<S, f64>(relative.origin, apply::<S, f64>(&relative.rotation, point)), cell.turn)
+    let point = apply::<S, f64>(&relative.rotation, cell.farthest(simd, own));
+    (add::<S, f64>(relative.origin, point), cell.turn)
 }
 
 /// n turned by `(I + K U)⁻¹` of what it is off by, along the tangents of the set.

@@ -39,7 +39,7 @@ fn nothing_is_deep_by_no_stage() {
 }
 
 /// What support points are found by.
-const SUPPORTS: [Stage; 3] = [Stage::SupportLanes, Stage::SupportNewton, Stage::SupportInterior];
+const SUPPORTS: [Stage; 3] = [Stage::SupportLanes, Stage::ProjectionSteps, Stage::ProjectionInterior];
 
 /// How accurate upper bounds are. The proof alone makes brackets as narrow as asked for, so that
 /// these show what the searches are good for: the share in percent of the bounds that exceed the
@@ -81,8 +81,8 @@ fn searches_end_at_the_best_direction_alone() {
 fn support_points_are_found_alone() {
     for (what, stage, percent) in [
         ("lanes", Stage::SupportLanes, [40.0, 15.0]),
-        ("Newton", Stage::SupportNewton, [99.0, 82.0]),
-        ("interior", Stage::SupportInterior, [99.0, 95.0]),
+        ("steps", Stage::ProjectionSteps, [99.0, 82.0]),
+        ("interior", Stage::ProjectionInterior, [99.0, 95.0]),
     ] {
         let stages = [Stage::Seek, Stage::Newton, Stage::CompassSearch, stage];
         let smooth = |case: &Case| case.is_smooth() && case.overlaps();

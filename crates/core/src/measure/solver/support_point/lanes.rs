@@ -11,33 +11,78 @@
 //! Taylor's formula proves how far the end of the last step is from the best, and a point of the
 //! body beside it.
 
-use crate::body::{Body, Cell};
+use crate::body::Body;
 use crate::measure::frames::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
 };
-use crate::measure::solver::tangent_newton::Side;
+use crate::measure::solver::tangent_newton::{Side, TAYLOR_ROUNDING};
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
 use nalgebra::Vector3;
 
 /// A point of a body that is farthest along a unit vector.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sought {
+pub(in crate::measure) struct Sought {
     /// The unit vector, body frame.
-    pub(super) n: Vector3<f64>,
+    pub(in crate::measure) n: Vector3<f64>,
     /// Largest support deficit of the point, metres.
-    pub(super) tolerance: f64,
+    pub(in crate::measure) tolerance: f64,
 }
 
 /// Points within whose displacement (the rounding of their normalized coordinates) points of the
 /// body are proven to lie, each with the active constraint; from the centre of the normalization
 /// on, body frame, metres. None where Newton's method does not arrive.
-pub(super) type Found = [Option<(Vector3<f64>, usize)>; MAX_LANES];
+pub(in crate::measure) type Found = [Option<(Vector3<f64>, usize)>; MAX_LANES];
 
 /// At most [`MAX_LANES`] points of a body, as vectorized work: a lane each where the body has one
 /// constraint. None depends on the others.
-pub(super) struct Farthest<'a> {
+pub(in crate::measure) struct Farthest<'a> {
+    pub(in crate::measure) body: &'a Body,
+    pub(in crate::measure) sought: &'a [Sought],
+}
+
+/// One point of a body that is farthest along a unit vector, as vectorized work.
+pub(super) struct FarthestOne<'a> {
     pub(super) body: &'a Body,
-    pub(super) sought: &'a [Sought],
+    /// The unit vector, body frame.
+    pub(super) n: Vector3<f64>,
+    /// Where to begin, from the centre of the normalization on, and the constraint active there; the
+    /// table of the body where there is none.
+    pub(super) from: Option<(Vector3<f64>, usize)>,
+    /// Largest support deficit of the point, metres.
+    pub(super) tolerance: f64,
+    /// Largest angle between n and the normal at the point, radians.
+    pub(super) angle: f64,
+}
+
+/// A point within whose displacement one of the body is proven to lie, with the constraint that is
+/// active there.
+pub(super) struct FoundOne {
+    /// From the centre of the normalization on, body frame, metres.
+    pub(super) x: Vector3<f64>,
+    /// Proven bound of how much farther along n the body reaches than x, metres.
+    pub(super) deficit: f64,
+    pub(super) active: usize,
+}
+
+impl WithSimd for FarthestOne<'_> {
+    /// The point, if it is found, and after how many evaluations.
+    type Output = (Option<FoundOne>, u32);
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { body, n, from, tolerance, angle } = self;
+        let n: V3<f64> = n.into();
+        let (start, active) = from.map_or_else(
+            || {
+                let cell = body.outline().cell(simd, n);
+                (cell.farthest(simd, n), body.outline().active(cell.place))
+            },
+            |(x, active)| (x.into(), active),
+        );
+        let (x, deficit, rounds) = farthest(simd, (body, active), start, n, [tolerance, angle]);
+        let holds = deficit <= tolerance && Side::at_home(simd, body, active).others_hold(simd, x);
+        (holds.then(|| FoundOne { x: x.into(), deficit, active }), rounds)
+    }
 }
 
 /// Most evaluations.
@@ -59,8 +104,9 @@ impl WithSimd for Farthest<'_> {
                 let n: V3<f64> = sought.n.into();
                 let cell = body.outline().cell(simd, n);
                 let active = body.outline().active(cell.place);
-                let (x, proven) = farthest(simd, (body, active), &cell, n, sought.tolerance);
-                let holds = proven > 0.0 && Side::at_home(simd, body, active).others_hold(simd, x);
+                let asked = [sought.tolerance, f64::INFINITY];
+                let (x, deficit, _) = farthest(simd, (body, active), cell.farthest(simd, n), n, asked);
+                let holds = deficit <= sought.tolerance && Side::at_home(simd, body, active).others_hold(simd, x);
                 *found = holds.then(|| (x.into(), active));
             }
         }
@@ -85,53 +131,63 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
     }
     let [x, y, z, tolerance] = loaded;
     let n = [x, y, z];
-    let (x, proven) = farthest(simd, (body, 0), &body.outline().cell(simd, n), n, tolerance);
-    for (number, column) in [x[0], x[1], x[2], proven].into_iter().zip(&mut columns) {
+    let start = body.outline().cell(simd, n).farthest(simd, n);
+    let asked = [tolerance, Lanes::<S>::splat(simd, f64::INFINITY)];
+    let (x, deficit, _) = farthest(simd, (body, 0), start, n, asked);
+    for (number, column) in [x[0], x[1], x[2], deficit].into_iter().zip(&mut columns) {
         number.store(column);
     }
     for (lane, found) in found.iter_mut().enumerate().take(sought.len()) {
-        let [x, y, z, proven] = [columns[0][lane], columns[1][lane], columns[2][lane], columns[3][lane]];
-        *found = (proven > 0.0).then(|| (Vector3::new(x, y, z), 0));
+        let [x, y, z, deficit] = [columns[0][lane], columns[1][lane], columns[2][lane], columns[3][lane]];
+        *found = deficit.is_finite().then(|| (Vector3::new(x, y, z), 0));
     }
 }
 
-/// The point farthest along unit vectors n, in these cells of the outline, as far as one constraint
-/// goes; and 1 where that is proven, 0 where it is not.
+/// The point farthest along unit vectors n, from a start, as far as one constraint goes, with a
+/// bound of its support deficit, infinite where it is not proven to be within the tolerance and the
+/// angle asked for; and the number of evaluations.
 #[inline(always)]
 fn farthest<S: Simd, N: Number<S>>(
     simd: S,
     (body, active): (&Body, usize),
-    cell: &Cell<N>,
+    start: V3<N>,
     n: V3<N>,
-    tolerance: N,
-) -> (V3<N>, N) {
+    [tolerance, angle]: [N; 2],
+) -> (V3<N>, N, u32) {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
     let side = Side::at_home(simd, body, active);
     let inverse = rows(simd, body.inverse());
     let e = apply_transposed(&inverse, n);
-    let mut x = add(cell.point, apply_symmetric(&cell.turn, n));
+    let mut x = start;
     let axes = side.localize(simd, &[[one, zero, zero], [zero, one, zero], [zero, zero, one]]);
-    let (mut best, mut proven, mut open) = (x, zero, one);
-    for _ in 0..MAX_ROUNDS {
+    let (mut best, mut deficit, mut open) = (x, N::splat(simd, f64::INFINITY), one);
+    let mut rounds = 0;
+    while rounds < MAX_ROUNDS {
+        rounds += 1;
         let (jet, inside) = side.jet(simd, x);
         let (dz, useful) = step(simd, &jet, e);
         let dx = apply(&inverse, dz);
         let next = side.extrapolate(simd, &jet, &axes, dx);
         let (inward, near) = side.inward(simd, &next);
-        let enough = (side.support_deficit(simd, &next, n, e) - dot(n, inward)).le(tolerance);
+        let multiplier = one / dot(n, next.plane.gradient);
+        let off = add_scaled(n, -multiplier, next.plane.gradient);
+        let aligned = dot(off, off).le(angle * angle);
+        let short = side.support_deficit(simd, &next, n, e);
+        let short = N::splat(simd, TAYLOR_ROUNDING).mul_add(short.abs() + multiplier, short - dot(n, inward));
+        let enough = N::and(simd, short.le(tolerance), aligned);
         let useful = N::and(simd, inside, useful);
         let found = N::and(simd, N::and(simd, useful, one.le(open)), N::and(simd, near, enough));
         x = add(x, dx);
         for i in 0..3 {
             best[i] = (x[i] + inward[i]).select(found, best[i]);
         }
-        proven = one.select(found, proven);
+        deficit = short.select(found, deficit);
         open = zero.select(found, open.select(useful, zero));
         if N::all(simd, open.le(zero)) {
             break;
         }
     }
-    (best, proven)
+    (best, deficit, rounds)
 }
 
 /// Newton's step from a point near the surface, and whether its normal has to do with e.

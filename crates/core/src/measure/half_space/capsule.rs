@@ -1,0 +1,53 @@
+//! The signed distance of a capsule from a half-space: that of the lower end of its axis, less the
+//! radius.
+
+use super::answer::HalfSpaceDistance;
+use super::set::HalfSpace;
+use crate::measure::capsule::Capsule;
+use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::options::Options;
+use crate::measure::status::Status;
+use crate::polynomial::gamma;
+use nalgebra::Vector3;
+
+/// Signed distance of a capsule at `pose` (to the world frame) from a half-space: positive apart,
+/// minus the penetration depth in overlap. It is tied where the axis lies along the plane, up to
+/// rounding: all of its points are as near then.
+///
+/// The bracket is that of rounding; the status says whether it is as narrow as `options` ask,
+/// relative to the larger one of the capsule's reach, `r + h`, and 1e-3 of its place.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel_core::measure::{Capsule, HalfSpace, Options, Pose, distance_of_capsule_to_half_space};
+///
+/// let (limb, floor) = (Capsule::new(0.1, 0.3)?, HalfSpace::new(Vector3::z(), 0.0)?);
+/// let upright = Pose::from_quaternion(Vector3::new(0.0, 0.0, 1.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let found = distance_of_capsule_to_half_space(&limb, &upright, &floor, &Options::default());
+/// assert!((found.value() - 0.6).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn distance_of_capsule_to_half_space(
+    capsule: &Capsule,
+    pose: &Pose,
+    half_space: &HalfSpace,
+    options: &Options<'_>,
+) -> HalfSpaceDistance {
+    let (normal, offset) = (half_space.normal(), half_space.offset());
+    let axis = pose.transform_direction(&Vector3::z()) * capsule.half_height_m();
+    let slope = axis.dot(normal);
+    let end = pose.translation() - if slope > 0.0 { axis } else { -axis };
+    let height = normal.dot(&end) - offset - capsule.radius_m();
+    let size = pose.translation().norm() + capsule.reach_m() + offset.abs();
+    let slack = (ROTATION_ERROR + gamma(16)) * size;
+    let (lower, upper) = (height - slack, height + slack);
+    let reach = if capsule.reach_m() > 0.0 { capsule.reach_m() } else { pose.translation().norm() };
+    HalfSpaceDistance {
+        status: Status::of(upper - lower <= options.accuracy() * reach),
+        lower,
+        upper,
+        witness: end - normal * capsule.radius_m(),
+        tied: capsule.half_height_m() > 0.0 && slope.abs() <= slack,
+        iterations: 0,
+    }
+}

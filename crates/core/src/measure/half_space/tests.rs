@@ -1,0 +1,203 @@
+//! Signed distances of half-spaces against closed forms, differences and the minimum over parts.
+
+use super::*;
+use crate::body::{Body, Compound};
+use crate::measure::capsule::Capsule;
+use crate::measure::overlap::{Decision, ThresholdError};
+use crate::measure::solver::stages::{Stage, except};
+use crate::measure::status::Status;
+use crate::measure::tests::{random_pose, zoo};
+use nalgebra::Vector3;
+use sublevel_testkit::Seeded;
+
+#[test]
+fn supports_have_closed_forms() {
+    // A body and its support along a direction of its own frame.
+    type Case = (Body, fn(&Vector3<f64>, &Vector3<f64>) -> f64);
+    fn dual(half: &Vector3<f64>, n: &Vector3<f64>, k: f64) -> f64 {
+        let q = k / (k - 1.0);
+        half.component_mul(n).map(|c| c.abs().powf(q)).sum().powf(1.0 / q)
+    }
+    let half = Vector3::new(0.4, 1.0, 2.5);
+    let power = |k| Body::superellipsoid("q", Vector3::zeros(), half, k).unwrap();
+    let cases: [Case; 6] = [
+        (power(2), |h, n| dual(h, n, 2.0)),
+        (power(4), |h, n| dual(h, n, 4.0)),
+        (power(6), |h, n| dual(h, n, 6.0)),
+        (power(8), |h, n| dual(h, n, 8.0)),
+        (Body::cuboid("b", half).unwrap(), |h, n| h.dot(&n.abs())),
+        (Body::cylinder("c", half.x, half.y).unwrap(), |h, n| h.x * n.x.hypot(n.y) + h.y * n.z.abs()),
+    ];
+    let (mut most, mut total) = (0, 0);
+    for seed in 0..3000 {
+        let mut random = Seeded(seed);
+        let (body, support) = &cases[(seed % 6) as usize];
+        let pose = random_pose(&mut random, 3.0);
+        // General directions, and nearly or exactly along an axis or a face.
+        let mut n = random.unit();
+        if seed % 5 > 1 {
+            let small = [0.0, 1e-12, 1e-6, 1e-3][(random.next() % 4) as usize];
+            n = (Vector3::from_fn(|i, _| f64::from(u8::from(i as u64 == seed % 3))) + n * small).normalize();
+        }
+        let offset = 3.0 * random.signed();
+        let half_space = HalfSpace::new(pose.transform_direction(&n), offset).unwrap();
+        let truth = half_space.normal().dot(pose.translation()) - support(&half, &-n) - offset;
+        let mut warm = WarmStart::default();
+        let ask = |warm: &mut WarmStart| distance_to_half_space(body, &pose, &half_space, &Options::default(), warm);
+        // Closed forms are left out once, so that the search has to find what they say.
+        for closed in [false, false, true] {
+            let found = if closed { ask(&mut warm) } else { except(&[Stage::ClosedForm], || ask(&mut warm)) };
+            let label = format!("seed {seed} {n:?}: {found:?} against {truth}");
+            assert_eq!(found.status, Status::Converged, "{label}");
+            assert!(found.lower <= truth + 1e-14 && truth - 1e-14 <= found.upper, "{label}");
+            let height = half_space.normal().dot(&found.witness) - offset;
+            assert!((height - found.upper).abs() < 1e-12, "{label}");
+            (most, total) = (most.max(found.iterations), total + found.iterations);
+        }
+    }
+    assert!(total < 4 * 6000 && most <= 90, "{total}, most {most}");
+}
+
+#[test]
+fn gradients_are_differences_apart_and_deep() {
+    let body = Body::ellipsoid("egg", Vector3::new(0.1, 0.2, 0.3), Vector3::new(0.5, 1.0, 2.0)).unwrap();
+    let options = Options::default().with_accuracy(1e-13).unwrap();
+    for seed in 0..200 {
+        let mut random = Seeded(seed);
+        let pose = random_pose(&mut random, 2.0);
+        let half_space = HalfSpace::new(random.unit(), 2.0 * random.signed()).unwrap();
+        let at = |pose: &Pose| distance_to_half_space(&body, pose, &half_space, &options, &mut WarmStart::default());
+        let gradient = at(&pose).pose_gradient(&pose, &half_space);
+        for axis in 0..3 {
+            let e = Vector3::from_fn(|i, _| f64::from(u8::from(i == axis)));
+            let turned = |t: f64| {
+                let turn = nalgebra::UnitQuaternion::from_scaled_axis(e * t) * pose.rotation();
+                Pose::from_quaternion(pose.translation() + e * t * 0.5, turn.coords.into()).unwrap()
+            };
+            let slope = (at(&turned(1e-4)).value() - at(&turned(-1e-4)).value()) / 2e-4;
+            let expected = gradient.angular[axis] + 0.5 * gradient.linear[axis];
+            assert!((slope - expected).abs() < 1e-5, "seed {seed}: {slope} against {expected}");
+        }
+    }
+}
+
+#[test]
+fn the_lowest_part_counts_and_half_spaces_are_checked() {
+    let at = |x: f64, z: f64| Body::ball("part", Vector3::new(x, 0.0, z), 1.0).unwrap();
+    let steps = Compound::new("steps", vec![at(0.0, 0.0), at(2.0, 0.5), at(4.0, 1.0)]).unwrap();
+    let mut warm = WarmStart::default();
+    for k in 0..60 {
+        let (sine, cosine) = (0.1 * f64::from(k)).sin_cos();
+        let half_space = HalfSpace::new(Vector3::new(sine, 0.0, cosine), -3.0).unwrap();
+        let truth = [(0.0, 0.0), (2.0, 0.5), (4.0, 1.0)].map(|(x, z)| sine * x + cosine * z - 1.0 + 3.0);
+        let truth = truth.into_iter().fold(f64::MAX, f64::min);
+        let found = distance_to_half_space(&steps, &Pose::identity(), &half_space, &Options::default(), &mut warm);
+        assert!((found.value() - truth).abs() < 1e-8 && found.lower <= truth, "{found:?} against {truth}");
+    }
+    assert!(matches!(HalfSpace::new(Vector3::z() * 1.001, 0.0), Err(HalfSpaceError::NotUnit(_))));
+    assert_eq!(HalfSpace::new(Vector3::z() * f64::NAN, 0.0), Err(HalfSpaceError::NotFinite("normal")));
+    assert_eq!(HalfSpace::new(Vector3::z(), f64::NAN), Err(HalfSpaceError::NotFinite("offset")));
+}
+
+#[test]
+fn decisions_agree_with_the_distance() {
+    let (mut open, mut decided) = (0, 0);
+    for seed in 0..60 {
+        let mut random = Seeded(seed);
+        for body in zoo(&mut random) {
+            let size = body.circumscribed().radius;
+            let pose = random_pose(&mut random, 3.0 * size);
+            let normal = random.unit();
+            let offset = normal.dot(pose.translation()) + 2.0 * size * random.signed();
+            let half_space = HalfSpace::new(normal, offset).unwrap();
+            let options = Options::default();
+            let mut warm = WarmStart::default();
+            let found = distance_to_half_space(&body, &pose, &half_space, &options, &mut warm);
+            for by in [0.0, 1e-12, -1e-12, 1e-6, -1e-6, 0.1, -0.1, 1.0, -1.0] {
+                let threshold = found.value() + by * size;
+                let label = format!("seed {seed} {}: {found:?} and {threshold}", body.name());
+                for mut warm in [WarmStart::default(), warm] {
+                    match nearer_to_half_space_than(&body, &pose, &half_space, threshold, &options, &mut warm).unwrap()
+                    {
+                        Decision::Yes => assert!(found.lower < threshold, "{label}"),
+                        Decision::No => assert!(found.upper >= threshold, "{label}"),
+                        Decision::Undecided { lower, upper } => {
+                            assert!(lower <= threshold && threshold <= upper, "{label}: [{lower}, {upper}]");
+                            assert!(upper - lower <= 1.001e-9 * size && by.abs() < 1e-8, "{label}: [{lower}, {upper}]");
+                            open += 1;
+                        }
+                    }
+                    decided += 1;
+                }
+            }
+            let touches = overlap_with_half_space(&body, &pose, &half_space, &options, &mut WarmStart::default());
+            let truth = if found.value() <= 0.0 { Decision::Yes } else { Decision::No };
+            assert_eq!(touches, truth, "seed {seed} {}: {found:?}", body.name());
+        }
+    }
+    assert!(10 * open < 4 * decided, "{open} of {decided} open: only thresholds within the bracket may be");
+    let body = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
+    let floor = HalfSpace::new(Vector3::z(), 0.0).unwrap();
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let asked = nearer_to_half_space_than(
+            &body,
+            &Pose::identity(),
+            &floor,
+            wrong,
+            &Options::default(),
+            &mut WarmStart::default(),
+        );
+        assert!(matches!(asked, Err(ThresholdError(_))), "{wrong}: {asked:?}");
+    }
+}
+
+#[test]
+fn decisions_about_several_parts_are_those_of_the_lowest() {
+    let at = |x: f64, z: f64| Body::superellipsoid("part", Vector3::new(x, 0.0, z), Vector3::repeat(1.0), 4).unwrap();
+    let steps = Compound::new("steps", vec![at(0.0, 0.0), at(2.0, 0.5), at(4.0, 1.0)]).unwrap();
+    let options = Options::default();
+    for k in 0..60 {
+        let (sine, cosine) = (0.1 * f64::from(k)).sin_cos();
+        let half_space = HalfSpace::new(Vector3::new(sine, 0.0, cosine), -1.5).unwrap();
+        let mut warm = WarmStart::default();
+        let found = distance_to_half_space(&steps, &Pose::identity(), &half_space, &options, &mut warm);
+        for by in [-1.0, -1e-6, 1e-6, 1.0] {
+            let asked = nearer_to_half_space_than(
+                &steps,
+                &Pose::identity(),
+                &half_space,
+                found.value() + by,
+                &options,
+                &mut warm,
+            );
+            assert_eq!(asked.unwrap(), if by > 0.0 { Decision::Yes } else { Decision::No }, "{k} {by}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn capsules_are_as_low_as_their_lower_end() {
+    for seed in 0..500 {
+        let mut random = Seeded(seed);
+        let size = 10_f64.powf(3.0 * random.signed());
+        let sizes = [0.0, 0.3, 1.0].map(|share| share * size);
+        let capsule = Capsule::new(sizes[random.next() as usize % 3], sizes[random.next() as usize % 3]).unwrap();
+        let pose = random_pose(&mut random, 5.0 * size);
+        let half_space = HalfSpace::new(random.unit(), 3.0 * size * random.signed()).unwrap();
+        let found = distance_of_capsule_to_half_space(&capsule, &pose, &half_space, &Options::default());
+        // The least over both ends of the axis, the only corners of the segment.
+        let ends = [1.0, -1.0].map(|side| {
+            let end = pose.transform_point(&(Vector3::z() * (side * capsule.half_height_m())));
+            half_space.normal().dot(&end) - half_space.offset()
+        });
+        let truth = ends[0].min(ends[1]) - capsule.radius_m();
+        let rounding = 1e-14 * size;
+        assert!(found.lower <= truth + rounding && truth - rounding <= found.upper, "seed {seed}: {found:?} {truth}");
+        assert_eq!(found.status, Status::Converged, "seed {seed}: {found:?}");
+        let height = half_space.normal().dot(&found.witness) - half_space.offset();
+        assert!((height - truth).abs() <= 1e-13 * size, "seed {seed}: {height} {truth}");
+    }
+    let lying = Capsule::new(0.1, 0.5).unwrap();
+    let floor = HalfSpace::new(Vector3::x(), 0.0).unwrap();
+    assert!(distance_of_capsule_to_half_space(&lying, &Pose::identity(), &floor, &Options::default()).tied);
+}

@@ -1,0 +1,106 @@
+//! Support points of bodies of any number of constraints: the convex program over one body, with a
+//! bracket of the height at every step that is worth one.
+
+use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
+use crate::measure::frames::query_frame::{Pair, Posed};
+use crate::measure::solver::active_constraints::ActiveSet;
+use crate::measure::solver::projection::{Objective, SingleProblem, Worth, solve_single};
+use nalgebra::Vector3;
+
+/// A point within whose displacement a point of the body lies, with the constraints that are active
+/// at it; query frame.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct SupportPoint {
+    pub(in crate::measure) x: Vector3<f64>,
+    pub(in crate::measure) active: ActiveSet,
+}
+
+impl SupportPoint {
+    /// A point where one constraint is active.
+    pub(super) fn at((x, active): (Vector3<f64>, usize)) -> Self {
+        Self { x, active: 1 << active }
+    }
+
+    /// No point at all.
+    pub(in crate::measure) const NONE: Self = Self { x: Vector3::new(f64::NAN, f64::NAN, f64::NAN), active: 0 };
+}
+
+/// Which point of a body is farthest along a direction, query frame.
+#[derive(Clone, Copy)]
+pub(super) struct SupportProgram<'a> {
+    pub(super) body: &'a Posed<'a>,
+    /// The direction r, of length 1 up to rounding.
+    pub(super) direction: Vector3<f64>,
+    /// Where to begin, and what may be active there; nothing where its active set is empty.
+    pub(super) start: SupportPoint,
+}
+
+/// Bracket of `max r·v` over the points v of a body; query units.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Supported {
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    pub(super) point: SupportPoint,
+    pub(super) iterations: u32,
+}
+
+impl SupportProgram<'_> {
+    /// Brackets the height to `narrow` query units if possible, or until `exhausted` says so after
+    /// a number of iterations. The point is the best one that is proven inside; where there is none
+    /// the lower bound is minus infinity.
+    pub(super) fn solve(&self, narrow: f64, exhausted: impl FnMut(u32) -> bool) -> Supported {
+        let Self { body, direction: r, start } = *self;
+        let (mut lower, mut upper) = (f64::NEG_INFINITY, r.dot(&body.interior) + body.reach(&body.interior));
+        let mut point = body.interior;
+        let objective = Objective::Farthest(r);
+        let problem = SingleProblem { body, objective: &objective, start: start.x, active: start.active, narrow };
+        let (iterations, active) = solve_single(&problem, exhausted, |trial| {
+            let multipliers = trial.multipliers.map(|m| m.max(0.0));
+            let rise = descent(body, &trial.y, &-r, &multipliers);
+            let slack = DUALITY_ROUNDING * (trial.y.norm() + rise.abs());
+            let bound = r.dot(&trial.y) + rise + body.displacement(&trial.y) + slack;
+            // Not `min`: a NaN bounds nothing.
+            if bound < upper {
+                upper = bound;
+            }
+            if let Some(y) = body.move_inside(&trial.y) {
+                let attained = r.dot(&y) - body.displacement(&y);
+                if attained > lower {
+                    (lower, point) = (attained, y);
+                }
+            }
+            if upper - lower <= narrow { Worth::Done } else { Worth::Wide }
+        });
+        Supported { lower, upper, point: SupportPoint { x: point, active }, iterations }
+    }
+
+    /// A point of the body within `tolerance` of the farthest, query units, if possible; none if
+    /// rounding leaves none that is proven inside.
+    fn point(&self, tolerance: f64) -> Option<SupportPoint> {
+        let found = self.solve(tolerance, |_| false);
+        (found.lower > f64::NEG_INFINITY).then_some(found.point)
+    }
+}
+
+/// A point of A within `tolerance` of the farthest along the unit vector n, query units, if
+/// possible, from a point known before or the table; none if rounding leaves none inside.
+pub(in crate::measure) fn support_of_a(
+    pair: &Pair<'_>,
+    n: &Vector3<f64>,
+    tolerance: f64,
+    known: Option<SupportPoint>,
+) -> Option<SupportPoint> {
+    let start = known.unwrap_or_else(|| SupportPoint::at(pair.farthest_a(n)));
+    SupportProgram { body: &pair.a, direction: *n, start }.point(tolerance)
+}
+
+/// The same of B.
+pub(in crate::measure) fn support_of_b(
+    pair: &Pair<'_>,
+    n: &Vector3<f64>,
+    tolerance: f64,
+    known: Option<SupportPoint>,
+) -> Option<SupportPoint> {
+    let start = known.unwrap_or_else(|| SupportPoint::at(pair.farthest_b(n)));
+    SupportProgram { body: &pair.b, direction: *n, start }.point(tolerance)
+}
