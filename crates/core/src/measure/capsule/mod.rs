@@ -14,6 +14,7 @@
 mod answer;
 mod axes;
 mod bounds;
+mod capsules_decision;
 mod decision;
 mod pair;
 mod shape;
@@ -26,7 +27,8 @@ use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
 pub use answer::CapsuleDistance;
 use axes::{Axis, of_axes};
-pub use decision::{nearer_to_capsule_than, overlap_with_capsule};
+pub use capsules_decision::{capsules_nearer_than, capsules_within_margin, overlap_of_capsules};
+pub use decision::{nearer_to_capsule_than, overlap_with_capsule, within_margin_of_capsule};
 pub(in crate::measure) use pair::Problem;
 pub use shape::{Capsule, CapsuleError};
 use solid::distance_until;
