@@ -119,10 +119,10 @@ impl Solver<'_> {
                 let found = self.warm(pair.slots, [rungs.len() - 1, 0], Measure::Signed, |warm| {
                     within_margin_of_capsule(solid, pose, capsule, capsule_pose, margin_m, options, warm)
                 });
-                (found, (pose, capsule_pose))
+                (found, (*pose, *capsule_pose))
             }
             (Thing::Capsule { capsule, pose }, Thing::Capsule { capsule: other, pose: other_pose }) => {
-                (capsules_within_margin(capsule, pose, other, other_pose, margin_m, options), (pose, other_pose))
+                (capsules_within_margin(capsule, pose, other, other_pose, margin_m, options), (*pose, *other_pose))
             }
             _ => return Some(self.capsule_distance(pair, options)).filter(|found| found.lower <= margin_m),
         };
