@@ -3,7 +3,7 @@
 
 use super::answer::CapsuleDistance;
 use super::axes::{Axis, bounds_of_axes, of_axes};
-use super::distance_of_capsules;
+use super::capsules::distance_of_capsules;
 use super::shape::Capsule;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
