@@ -27,7 +27,8 @@ pub(super) fn distance_until(
     }
     let bound = |ball: &Ball| axis_gap((ball, pose), (capsule, capsule_pose));
     let found = nearest_part(solid, bound, &goal, warm, |part, upper, hint| {
-        let goal = StopCriterion { near: goal.near, far: goal.far.min(upper) };
+        // Deeper than the radius nothing is known of an axis that is not proven outside.
+        let goal = StopCriterion { near: goal.near, far: goal.far.min(upper.max(-capsule.radius_m())) };
         Problem { goal, ..problem }.solve((&parts[part], pose), hint)
     });
     let Least { best, lower, tied, iterations, .. } = found;
