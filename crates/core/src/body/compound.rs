@@ -74,9 +74,8 @@ impl Compound {
             ((ball.center - center).norm() + ball.radius + positions) * (1.0 + 8.0 * f64::EPSILON)
         };
         let radius = parts.iter().map(|part| around(part.circumscribed())).fold(0.0, f64::max);
-        let balls: Vec<Ball> = parts.iter().map(|part| *part.circumscribed()).collect();
         Ok(Self {
-            tree: PartTree::new(&balls),
+            tree: PartTree::new(&parts),
             name: name.to_owned(),
             id: BodyId::of_parts(parts.iter().map(Body::id)),
             parts,

@@ -68,7 +68,7 @@ pub use mesh_piece::{Caps, MeshError, Piece};
 pub use normalization::Normalization;
 pub use objective::{Objective, UnknownObjective};
 pub use obstacle::Obstacle;
-pub use part_tree::{NodeContent, PartNode, PartTree};
+pub use part_tree::{Centers, NodeContent, PartCenters, PartNode, PartTree};
 pub use placement::{Placement, Sample};
 pub use provenance::Provenance;
 pub use radial::Volume;

@@ -9,7 +9,7 @@
 //! takes over. No method's result is accepted by itself: an answer is accepted when its bracket
 //! (`bounds`) is narrow enough. A bracket determines the normal to about the root of its width
 //! only, so the optimality equations are checked as well. Solids of several parts are solved pair
-//! by pair (`pairwise_minimum`). Imports go one way: measures on `solver`, that on `bounds`, these
+//! by pair (`pairwise_minimum`), few of them, for trees bound the others (`part_pairs`). Imports go one way: measures on `solver`, that on `bounds`, these
 //! on `frames`. Neither clock nor allocator nor threads are used.
 
 mod batch;
@@ -25,6 +25,7 @@ mod level;
 mod options;
 mod overlap;
 mod pairwise_minimum;
+mod part_pairs;
 mod penetration;
 mod point;
 mod signed;
@@ -36,8 +37,8 @@ mod warm;
 
 pub use batch::{BatchError, distance_batch, distance_to_capsule_batch, is_solved_in_lanes};
 pub use capsule::{
-    Capsule, CapsuleDistance, CapsuleError, distance_of_capsules, distance_to_capsule, nearer_to_capsule_than,
-    overlap_with_capsule,
+    Capsule, CapsuleDistance, CapsuleError, capsules_nearer_than, capsules_within_margin, distance_of_capsules,
+    distance_to_capsule, nearer_to_capsule_than, overlap_of_capsules, overlap_with_capsule, within_margin_of_capsule,
 };
 pub use cast_ball::{Sweep, cast_ball};
 pub use cast_ray::{Ray, RayCast, RayError, RayHit, cast_ray};

@@ -32,9 +32,9 @@ pub enum Decision {
 
 /// Distance within a margin, or proven beyond it.
 #[derive(Clone, Copy, Debug)]
-pub enum WithinMargin {
+pub enum WithinMargin<T = Distance> {
     /// The distance, which is not proven to exceed the margin.
-    Within(Distance),
+    Within(T),
     /// The distance exceeds the margin; metres.
     Beyond {
         /// Proven lower bound of the distance.

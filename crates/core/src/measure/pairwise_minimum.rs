@@ -5,11 +5,12 @@
 //! parts. How deep unions overlap is another matter: a translation has to take all pairs apart at
 //! once ([`crate::measure::signed::separating_translation`]).
 
-use crate::body::{NodeContent, PartNode};
-use crate::measure::bounds::culling::CULLING_SLACK;
-use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
+use crate::body::{Ball, Solid};
+use crate::measure::frames::pose::Pose;
+use crate::measure::part_pairs::{NodeBound, TreePair, count, nodes, only_node};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// A part or a solid with its pose.
 pub(in crate::measure) type At<'a, T> = (&'a T, &'a Pose);
@@ -90,76 +91,50 @@ impl<T: Bracketed> Incumbent<T> {
     }
 }
 
-/// Solves for the pairs of this many parts one by one, but for those whose `bound`, a cheap lower
-/// bound, exceeds the best upper bound; ends early with an upper bound of at most `enough`. The
-/// bracket of the minimum is the minimum of the brackets.
+/// Solves for pairs of parts, the likeliest first, but for those whose bound exceeds the best upper
+/// bound, or what the goal asks no more about; ends early with an upper bound that meets the goal.
+/// The bracket of the minimum is the minimum of the brackets.
 ///
-/// The pair of the last answer comes first, or that of the lowest bound: the smaller the first
+/// The pair of the last answer comes first, or that to which the trees lead: the smaller the first
 /// answer, the fewer of the others need be looked at. `warm` is left with the hint and the parts of
 /// the least. `solve` is given the best upper bound: beyond it an answer does not count.
-pub(in crate::measure) fn least<T: Bracketed>(
-    (len_a, len_b): (usize, usize),
-    bound: impl Fn((usize, usize)) -> f64,
-    enough: f64,
+pub(in crate::measure) fn nearest<T: Bracketed, F: Fn(usize, usize) -> NodeBound>(
+    trees: &TreePair<'_, F>,
+    goal: &StopCriterion,
     warm: &mut WarmStart,
     mut solve: impl FnMut((usize, usize), f64, &mut WarmStart) -> T,
 ) -> Least<T> {
-    let pairs = || (0..len_a).flat_map(|i| (0..len_b).map(move |j| (i, j)));
-    let first = of_last_answer(warm, (len_a, len_b))
-        .unwrap_or_else(|| pairs().min_by(|p, q| bound(*p).total_cmp(&bound(*q))).unwrap_or((0, 0)));
+    let first = of_last_answer(warm, trees.parts()).unwrap_or_else(|| trees.likeliest());
+    count::solved();
     let mut known = Incumbent::new(solve(first, f64::INFINITY, warm), first);
-    for pair in pairs().filter(|pair| *pair != first) {
-        let upper = known.upper();
-        if upper <= enough {
-            break;
-        }
-        if bound(pair) > upper {
+    let mut walk = trees.walk();
+    while known.upper() > goal.near {
+        let Some(pair) = walk.next(known.upper().min(goal.far)) else { break };
+        if pair == first {
             continue;
         }
         let mut hint = WarmStart::default();
-        let found = solve(pair, upper, &mut hint);
+        count::solved();
+        let found = solve(pair, known.upper(), &mut hint);
         known.take(found, pair, &hint, warm);
     }
+    known.rival = known.rival.min(walk.left_out);
     known.least(warm)
 }
 
-/// The same for the distance, by trees of balls: pairs of nodes whose balls are farther apart than
-/// the best upper bound are left out with all of their parts, nearer ones come first.
-pub(in crate::measure) fn nearest<T: Bracketed>(
-    balls: &TreePair<'_>,
-    enough: f64,
+/// The same for the parts of one solid, with a bound of the measure for all that is in a ball of its
+/// frame.
+pub(in crate::measure) fn nearest_part<T: Bracketed>(
+    solid: &impl Solid,
+    bound: impl Fn(&Ball) -> f64,
+    goal: &StopCriterion,
     warm: &mut WarmStart,
-    mut solve: impl FnMut((usize, usize), f64, &mut WarmStart) -> T,
+    mut solve: impl FnMut(usize, f64, &mut WarmStart) -> T,
 ) -> Least<T> {
-    let first = of_last_answer(warm, balls.parts()).unwrap_or_else(|| balls.descend());
-    let mut known = Incumbent::new(solve(first, f64::INFINITY, warm), first);
-    let mut stack = [(0.0, 0, 0); STACK];
-    let mut height = 1;
-    while height > 0 && known.upper() > enough {
-        height -= 1;
-        let (gap, i, j) = stack[height];
-        if gap > known.upper() {
-            continue;
-        }
-        match balls.divided(i, j) {
-            Divided::Parts(pair) if pair != first => {
-                let mut hint = WarmStart::default();
-                let found = solve(pair, known.upper(), &mut hint);
-                known.take(found, pair, &hint, warm);
-            }
-            Divided::Parts(_) => {}
-            // The nearer one on top.
-            Divided::Nodes([near, far]) => {
-                for (i, j, gap) in [far, near] {
-                    if gap <= known.upper() {
-                        stack[height] = (gap, i, j);
-                        height += 1;
-                    }
-                }
-            }
-        }
-    }
-    known.least(warm)
+    let own = only_node(solid.circumscribed());
+    let (nodes, other) = (nodes(solid, &own), only_node(&Ball { center: Vector3::zeros(), radius: 0.0 }));
+    let trees = TreePair::new(nodes, &other, |i, _| NodeBound::of(bound(&nodes[i].ball)));
+    nearest(&trees, goal, warm, |(i, _), upper, hint| solve(i, upper, hint))
 }
 
 /// The parts of the last answer, if there was one of these solids; else `warm` is cold.
@@ -170,75 +145,4 @@ fn of_last_answer(warm: &mut WarmStart, (len_a, len_b): (usize, usize)) -> Optio
         return None;
     }
     Some(parts)
-}
-
-/// Most pairs of nodes that wait: each division adds one, and trees of 256 parts, halved, are nine
-/// nodes high.
-const STACK: usize = 2 * (u16::BITS as usize) + 2;
-
-/// Trees of balls around the parts of two solids, where they stand.
-pub(in crate::measure) struct TreePair<'a> {
-    a: &'a [PartNode],
-    b: &'a [PartNode],
-    /// From B's frame to A's.
-    rotation: Matrix3<f64>,
-    translation: Vector3<f64>,
-}
-
-/// What a pair of nodes is made of.
-enum Divided {
-    /// Parts of A and of B.
-    Parts((usize, usize)),
-    /// Pairs of nodes with the gaps of their balls, the nearer one first.
-    Nodes([(usize, usize, f64); 2]),
-}
-
-impl<'a> TreePair<'a> {
-    /// A solid without a tree is one node.
-    pub(in crate::measure) fn new((a, pose_a): At<'a, [PartNode]>, (b, pose_b): At<'a, [PartNode]>) -> Self {
-        let inverse = pose_a.rotation().to_rotation_matrix().transpose().into_inner();
-        let rotation = inverse * pose_b.rotation().to_rotation_matrix().into_inner();
-        Self { a, b, rotation, translation: inverse * (pose_b.translation() - pose_a.translation()) }
-    }
-
-    /// How many parts there are.
-    fn parts(&self) -> (usize, usize) {
-        (self.a.len().div_ceil(2), self.b.len().div_ceil(2))
-    }
-
-    /// Lower bound of the distance of what is in two nodes, metres.
-    fn gap(&self, i: usize, j: usize) -> f64 {
-        let (ball_a, ball_b) = (&self.a[i].ball, &self.b[j].ball);
-        let apart = (self.rotation * ball_b.center + self.translation - ball_a.center).norm();
-        let size = apart + ball_a.radius + ball_b.radius + ball_a.center.norm() + ball_b.center.norm();
-        apart - ball_a.radius - ball_b.radius - (RELATIVE_ERROR + CULLING_SLACK) * (size + self.translation.norm())
-    }
-
-    fn divided(&self, i: usize, j: usize) -> Divided {
-        let (a, b) = (&self.a[i], &self.b[j]);
-        let nodes = match (a.content, b.content) {
-            (NodeContent::Part(part_a), NodeContent::Part(part_b)) => {
-                return Divided::Parts((part_a.into(), part_b.into()));
-            }
-            // The larger one is divided.
-            (NodeContent::Nodes(nodes), NodeContent::Part(_)) => nodes.map(|node| (usize::from(node), j)),
-            (NodeContent::Nodes(nodes), NodeContent::Nodes(_)) if a.ball.radius >= b.ball.radius => {
-                nodes.map(|node| (usize::from(node), j))
-            }
-            (_, NodeContent::Nodes(nodes)) => nodes.map(|node| (i, usize::from(node))),
-        };
-        let [first, second] = nodes.map(|(i, j)| (i, j, self.gap(i, j)));
-        Divided::Nodes(if first.2 <= second.2 { [first, second] } else { [second, first] })
-    }
-
-    /// The parts that nearer balls lead to.
-    fn descend(&self) -> (usize, usize) {
-        let (mut i, mut j) = (0, 0);
-        loop {
-            match self.divided(i, j) {
-                Divided::Parts(pair) => return pair,
-                Divided::Nodes([near, _]) => (i, j) = (near.0, near.1),
-            }
-        }
-    }
 }

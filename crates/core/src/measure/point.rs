@@ -8,13 +8,14 @@
 //! plus what the body's curvature adds. That of a segment has no curvature along the axis of its
 //! own.
 
-use crate::body::{Body, ClosedForm, Solid};
+use crate::body::{Ball, Body, ClosedForm, Solid};
+use crate::measure::bounds::culling::CULLING_SLACK;
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::query_frame::Posed;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{At, Least, bracketed, least};
+use crate::measure::pairwise_minimum::{At, Least, bracketed, nearest_part};
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart};
 use crate::measure::solver::exact_shape::{
@@ -108,25 +109,27 @@ pub fn distance_to_point(
     let tolerance = options.accuracy() * solid.circumscribed().radius;
     Ok(match solid.parts() {
         [body] => Projection::new(body, pose).to(point, tolerance, options, warm).into_distance(tolerance),
-        parts => nearest((parts, pose), point, tolerance, options, warm),
+        _ => nearest((solid, pose), point, tolerance, options, warm),
     })
 }
 
 /// The nearest part.
 fn nearest(
-    (parts, pose): At<'_, [Body]>,
+    (solid, pose): At<'_, impl Solid>,
     point: &Vector3<f64>,
     tolerance: f64,
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> PointDistance {
-    let bound = |(i, _): (usize, usize)| {
-        let ball = parts[i].circumscribed();
-        let center = pose.transform_point(&ball.center);
-        (point - center).norm() - ball.radius - 1e-12 * (point.norm() + center.norm() + ball.radius)
+    let seen = pose.rotation().inverse_transform_vector(&(point - pose.translation()));
+    let error = (ROTATION_ERROR + gamma(16)) * seen.norm();
+    let bound = |ball: &Ball| {
+        let apart = (seen - ball.center).norm();
+        apart - ball.radius - error - CULLING_SLACK * (apart + ball.radius + ball.center.norm())
     };
-    let found = least((parts.len(), 1), bound, 0.0, warm, |(i, _), _, hint| {
-        Projection::new(&parts[i], pose).to(point, tolerance, options, hint)
+    let (parts, end) = (solid.parts(), StopCriterion { near: 0.0, ..StopCriterion::NARROW });
+    let found = nearest_part(solid, bound, &end, warm, |part, _, hint| {
+        Projection::new(&parts[part], pose).to(point, tolerance, options, hint)
     });
     let Least { best, lower, tied, iterations, .. } = found;
     let answer = Projected { lower, iterations, ..best }.into_distance(tolerance);

@@ -1,5 +1,6 @@
 //! Batches of poses, against single queries.
 
+mod balls;
 mod capsules;
 mod shapes;
 

@@ -2,8 +2,8 @@
 
 use nalgebra::Vector3;
 use sublevel_core::measure::{
-    Capsule, CapsuleDistance, Options, Pose, Status, Twist, distance_of_capsule_to_half_space, distance_of_capsules,
-    distance_to_capsule,
+    Capsule, CapsuleDistance, Options, Pose, Status, Twist, WithinMargin, capsules_within_margin,
+    distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, within_margin_of_capsule,
 };
 
 use super::answer::{Answer, AnswerStatus};
@@ -70,8 +70,12 @@ impl Solver<'_> {
             Measure::NearerThan => return self.decided(&decide(self, pair, self.ask.threshold_m, options)),
             _ => {}
         }
-        let found = self.capsule_distance(pair, &options);
-        let answer = from_signed(measure, self.of_capsule(pair, &found), self.ask.threshold_m);
+        self.answer_of_capsule(measure, pair, &self.capsule_distance(pair, &options))
+    }
+
+    /// What the signed distance of a pair with a capsule in it says of a measure.
+    pub(crate) fn answer_of_capsule(&self, measure: Measure, pair: &Pair<'_>, found: &SignedCapsule) -> Answer {
+        let answer = from_signed(measure, self.of_capsule(pair, found), self.ask.threshold_m);
         // A distance is known where the depth is not.
         let settled = measure == Measure::Distance && answer.upper == 0.0;
         if settled { Answer { status: AnswerStatus::Converged, ..answer } } else { answer }
@@ -95,6 +99,37 @@ impl Solver<'_> {
             iterations: found.iterations,
             rungs: pair.finest_rungs(),
             ..Answer::bracket(found.status, found.lower, found.upper, stopped)
+        }
+    }
+
+    /// The signed distance of a pair with a capsule in it, unless it is beyond a margin that is not
+    /// negative, metres: then it is not worked out.
+    pub(crate) fn capsule_within(
+        &self,
+        pair: &Pair<'_>,
+        margin_m: f64,
+        options: &Options<'_>,
+    ) -> Option<SignedCapsule> {
+        let (found, poses) = match (&pair.a, &pair.b) {
+            (Thing::Capsule { .. }, Thing::Solid { set: None, .. }) => {
+                return Some(self.capsule_within(&pair.swapped(), margin_m, options)?.swapped());
+            }
+            (Thing::Solid { rungs, pose, set: None }, Thing::Capsule { capsule, pose: capsule_pose }) => {
+                let solid = &**rungs.last()?;
+                let found = self.warm(pair.slots, [rungs.len() - 1, 0], Measure::Signed, |warm| {
+                    within_margin_of_capsule(solid, pose, capsule, capsule_pose, margin_m, options, warm)
+                });
+                (found, (*pose, *capsule_pose))
+            }
+            (Thing::Capsule { capsule, pose }, Thing::Capsule { capsule: other, pose: other_pose }) => {
+                (capsules_within_margin(capsule, pose, other, other_pose, margin_m, options), (*pose, *other_pose))
+            }
+            _ => return Some(self.capsule_distance(pair, options)).filter(|found| found.lower <= margin_m),
+        };
+        match found {
+            Ok(WithinMargin::Beyond { .. }) => None,
+            Ok(WithinMargin::Within(found)) => Some(SignedCapsule::of(&found, Some(poses))),
+            Err(_) => Some(self.capsule_distance(pair, options)),
         }
     }
 

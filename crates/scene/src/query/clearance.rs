@@ -274,6 +274,14 @@ impl Clearance {
                 _ => return Some(solver.measure(0, pair)),
             }
         }
+        // So is that of a capsule, however deep.
+        if pair.has_capsule() && threshold >= 0.0 {
+            if pair.a.box_gap_m(&pair.b) > threshold {
+                return None;
+            }
+            let found = solver.capsule_within(pair, threshold, &options)?;
+            return Some(solver.answer_of_capsule(Measure::Signed, pair, &found));
+        }
         let found = decide(solver, pair, threshold, options);
         (found.verdict != Verdict::No).then(|| solver.measure(0, pair))
     }

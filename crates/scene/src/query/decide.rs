@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{
-    Capsule, Decision, Options, Pose, nearer_than, nearer_to_capsule_than, overlap, overlap_with_capsule,
-    signed_distance,
+    Capsule, Decision, Options, Pose, capsules_nearer_than, nearer_than, nearer_to_capsule_than, overlap,
+    overlap_of_capsules, overlap_with_capsule, signed_distance,
 };
 
 use super::answer::Verdict;
@@ -74,6 +74,16 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
             let found = decide(solver, &pair.swapped(), threshold, options);
             let [solid, capsule] = found.rungs;
             Bracket { rungs: [capsule, solid], ..found }
+        }
+        (Thing::Capsule { capsule, pose }, Thing::Capsule { capsule: other, pose: other_pose }) if threshold >= 0.0 => {
+            capsules((capsule, pose), (other, other_pose), threshold)
+        }
+        (Thing::Capsule { capsule, pose }, Thing::Point(point))
+        | (Thing::Point(point), Thing::Capsule { capsule, pose })
+            if threshold >= 0.0 =>
+        {
+            let place = Pose::identity().with_translation(*point);
+            capsules((capsule, pose), (&Capsule::POINT, &place), threshold)
         }
         (Thing::Capsule { .. }, _) | (_, Thing::Capsule { .. }) => {
             let found = solver.capsule_distance(pair, &options);
@@ -147,6 +157,17 @@ fn solid_and_capsule(
             .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY })
     });
     Bracket { rungs: [u8::try_from(coarser.len()).unwrap_or(u8::MAX), 0], ..Bracket::decided(decision, threshold) }
+}
+
+/// Compares the distance of two capsules with a threshold that is not negative.
+fn capsules((a, pose_a): (&Capsule, &Pose), (b, pose_b): (&Capsule, &Pose), threshold: f64) -> Bracket {
+    if threshold == 0.0 {
+        return Bracket::decided(overlap_of_capsules(a, pose_a, b, pose_b), threshold);
+    }
+    // Only thresholds that are no lengths are refused.
+    let decision = capsules_nearer_than(a, pose_a, b, pose_b, threshold)
+        .unwrap_or(Decision::Undecided { lower: 0.0, upper: f64::INFINITY });
+    Bracket::decided(decision, threshold)
 }
 
 /// Brackets against thresholds.

@@ -33,6 +33,10 @@ impl Pair<'_> {
         Self { a: self.b, b: self.a, slots: self.slots.map(|PairSlots { a, b }| PairSlots { a: b, b: a }) }
     }
 
+    pub(crate) fn has_capsule(&self) -> bool {
+        [&self.a, &self.b].iter().any(|thing| matches!(thing, Thing::Capsule { .. }))
+    }
+
     /// The finest rungs of both; 0 where there are none.
     pub(crate) fn finest_rungs(&self) -> [u8; 2] {
         [&self.a, &self.b].map(|thing| match thing {

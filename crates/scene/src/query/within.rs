@@ -7,7 +7,7 @@ use sublevel_core::measure::{Options, WithinMargin, within_margin};
 use super::answer::{Answer, AnswerStatus, Verdict};
 use super::ask::{Ask, Measure};
 use super::candidates::Candidates;
-use super::decide::decide;
+use super::decide::{compare, decide};
 use super::selection::Selection;
 use super::solver::{Pair, Solids, Solver};
 use super::thing::{PairSlots, Thing};
@@ -76,6 +76,17 @@ impl Within {
             let Ok(WithinMargin::Within(found)) = found else { return None };
             nearer = found.upper < threshold || found.upper == 0.0;
             known = Some((index, solver.distance(&found, &Solids { a, pose_a, b, pose_b })));
+        } else if let (Some(index), true) = (
+            measures.iter().position(|measure| matches!(measure, Measure::Distance | Measure::Signed)),
+            threshold >= 0.0,
+        ) && pair.has_capsule()
+        {
+            if pair.a.box_gap_m(&pair.b) > threshold {
+                return None;
+            }
+            let found = solver.capsule_within(pair, threshold, &self.ask.options(index, solver.stop))?;
+            nearer = compare::against(found.lower, found.upper, threshold) == Verdict::Yes;
+            known = Some((index, solver.answer_of_capsule(measures[index], pair, &found)));
         } else {
             let found = decide(solver, pair, threshold, Options::default().with_stop(solver.stop.flag()));
             if found.verdict == Verdict::No {

@@ -7,6 +7,7 @@
 //! others. A lane computes from its own pose only and selects where a single query would branch, so
 //! that no answer depends on the other poses of the batch.
 
+mod balls;
 mod capsules;
 mod error;
 mod iterate;
@@ -23,13 +24,14 @@ use crate::measure::frames::vector::{V3, add, apply, apply_transposed, dot, rows
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::continuation::{limits, worth_a_bracket};
-use crate::measure::solver::exact_shape::{Cuboid, Cylinder};
+use crate::measure::solver::exact_shape::{Cuboid, Cylinder, LaneSet, Segment};
 use crate::measure::solver::initial_guess::{Start, facing, meeting, middle};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, bracket, moved};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Vector, WithSimd, dispatch_lanes};
+use balls::BallBatch;
 pub use capsules::distance_to_capsule_batch;
 pub use error::BatchError;
 use iterate::Iterate;
@@ -45,7 +47,7 @@ use waiting::{Group, MAX_COARSE, Waiting};
 /// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
 /// its own pose only, to the last bit. Single bodies of one constraint, and such a body beside a
 /// box or a cylinder, are solved several poses at a time, which takes a fraction of the time of as
-/// many queries; all others, and poses that do not converge at once such as those in contact, are
+/// many queries, of balls by the projection of their centres; all others, and poses that do not converge at once such as those in contact, are
 /// solved one by one.
 ///
 /// # Errors
@@ -105,31 +107,43 @@ pub fn is_solved_in_lanes(a: &impl Solid, b: &impl Solid) -> bool {
 enum LaneMethod<'a> {
     /// Both have one constraint.
     Smooth,
-    /// One has one constraint, the other is a box.
-    Cuboid(&'a ClosedForm, Cuboid),
-    /// One has one constraint, the other is a cylinder.
-    Cylinder(&'a ClosedForm, Cylinder),
+    /// One has one constraint, the other is such a shape; of two balls the second.
+    Beside(&'a ClosedForm, LaneShape),
+}
+
+/// What a body with one constraint is beside.
+#[derive(Clone, Copy)]
+enum LaneShape {
+    /// A ball, beside another one, of this radius, metres.
+    Ball(f64),
+    Cuboid(Cuboid),
+    Cylinder(Cylinder),
 }
 
 impl<'a> LaneMethod<'a> {
     fn of(a: &'a Body, b: &'a Body) -> Option<Self> {
         let other = match (a.is_smooth(), b.is_smooth()) {
+            (true, true) if runs(Stage::ClosedForm) && ball_radius_m(a).is_some() && ball_radius_m(b).is_some() => b,
             (true, true) => return Some(Self::Smooth),
             (true, false) => b,
             (false, true) => a,
             (false, false) => return None,
         };
         let form = other.closed_form().filter(|form| form.axes().is_none())?;
-        match *form.shape() {
-            ExactShape::Cuboid { half_extents_m, .. } => {
-                Some(Self::Cuboid(form, Cuboid { half_extents: half_extents_m }))
-            }
+        let shape = match *form.shape() {
+            ExactShape::Cuboid { half_extents_m, .. } => LaneShape::Cuboid(Cuboid { half_extents: half_extents_m }),
             ExactShape::Cylinder { radius_m, half_height_m, .. } => {
-                Some(Self::Cylinder(form, Cylinder { radius: radius_m, half_height: half_height_m }))
+                LaneShape::Cylinder(Cylinder { radius: radius_m, half_height: half_height_m })
             }
-            ExactShape::Capsule { .. } => None,
-        }
+            ExactShape::Capsule { radius_m, .. } => LaneShape::Ball(radius_m),
+        };
+        Some(Self::Beside(form, shape))
     }
+}
+
+/// Radius of a body that is a ball, metres.
+fn ball_radius_m(body: &Body) -> Option<f64> {
+    body.closed_form()?.shape().ball_radius_m()
 }
 
 /// The answers of single bodies. Not generic, so that it is compiled with this crate, whatever its
@@ -145,15 +159,43 @@ fn in_lanes(
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let standing = std::slice::from_ref(pose_a);
     let (smooth, of_form) = if a.is_smooth() { ((a, standing), poses_b) } else { ((b, poses_b), standing) };
-    match method {
-        LaneMethod::Smooth => dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers }),
-        LaneMethod::Cuboid(form, set) => {
-            let answers = OfBodies { a: of_a, b: of_b, options, tolerance, answers };
-            dispatch_lanes(ShapeBatch { smooth, form: (form, of_form), set, tolerance, answers });
+    let (form, shape) = match method {
+        LaneMethod::Smooth => {
+            return dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
         }
-        LaneMethod::Cylinder(form, set) => {
-            let answers = OfBodies { a: of_a, b: of_b, options, tolerance, answers };
-            dispatch_lanes(ShapeBatch { smooth, form: (form, of_form), set, tolerance, answers });
+        LaneMethod::Beside(form, shape) => ((form, of_form), shape),
+    };
+    let work = ShapeWork { smooth, form, of_a, of_b, options, tolerance, answers };
+    match shape {
+        LaneShape::Ball(radius) => work.beside(Segment { half_length: 0.0 }, radius),
+        LaneShape::Cuboid(set) => work.beside(set, 0.0),
+        LaneShape::Cylinder(set) => work.beside(set, 0.0),
+    }
+}
+
+/// A smooth body beside a shape, as it is to be answered.
+struct ShapeWork<'a> {
+    smooth: (&'a Body, &'a [Pose]),
+    form: (&'a ClosedForm, &'a [Pose]),
+    of_a: (&'a Body, &'a Pose),
+    of_b: (&'a Body, &'a [Pose]),
+    options: &'a Options<'a>,
+    tolerance: f64,
+    answers: &'a mut [Distance],
+}
+
+impl ShapeWork<'_> {
+    /// Beside all that is within a radius (metres) of this set: of a ball by its centre, else, and
+    /// without a radius, by Newton's method.
+    fn beside(self, set: impl LaneSet, form_radius: f64) {
+        let Self { smooth, form, of_a, of_b, options, tolerance, answers } = self;
+        let answers = OfBodies { a: of_a, b: of_b, options, tolerance, answers };
+        let batch = ShapeBatch { smooth, form, set, tolerance, answers };
+        match (smooth.0.closed_form(), ball_radius_m(smooth.0)) {
+            (Some(ball), Some(radius)) if runs(Stage::ClosedForm) => {
+                dispatch_lanes(BallBatch { batch, radius, form_radius, displacement: ball.displacement_m() });
+            }
+            _ => dispatch_lanes(batch),
         }
     }
 }

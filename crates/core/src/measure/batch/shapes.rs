@@ -72,7 +72,7 @@ impl ShapeAnswers for OfBodies<'_> {
 
     fn write(&mut self, answer: usize, found: &ExactProven) {
         let b = (self.b.0, &self.b.1[answer]);
-        let exact = Exact::new(self.a, b).expect("one is smooth, the other has a closed form");
+        let exact = Exact::beside_form(self.a, b).expect("one is smooth, the other has a closed form");
         self.answers[answer] = exact.answer(found, self.tolerance);
     }
 
@@ -220,7 +220,11 @@ impl<P: LaneSet, A: ShapeAnswers> ShapeBatch<'_, P, A> {
 
     /// The smooth body as seen from the shape.
     #[inline(always)]
-    fn relative<S: Simd, N: Vector<S>, const LANES: usize>(&self, simd: S, poses: &[usize; LANES]) -> Relative<N> {
+    pub(super) fn relative<S: Simd, N: Vector<S>, const LANES: usize>(
+        &self,
+        simd: S,
+        poses: &[usize; LANES],
+    ) -> Relative<N> {
         let ((body, of_body), (form, of_form)) = (self.smooth, self.form);
         let home = lane_rotations::<S, N, LANES>(simd, of_form, poses);
         let away = lane_rotations::<S, N, LANES>(simd, of_body, poses);
@@ -233,7 +237,7 @@ impl<P: LaneSet, A: ShapeAnswers> ShapeBatch<'_, P, A> {
 
     /// Writes the answers of the lanes that are set in `proven`.
     #[inline(always)]
-    fn write<S: Simd>(&mut self, group: &Group<MAX_LANES>, proven: u32, brackets: &LaneBracket<Lanes<S>>) {
+    pub(super) fn write<S: Simd>(&mut self, group: &Group<MAX_LANES>, proven: u32, brackets: &LaneBracket<Lanes<S>>) {
         let LaneBracket { lower, upper, x, nearest, n, multiplier } = *brackets;
         let mut columns = Aligned([[0.0; MAX_LANES]; 12]);
         let numbers = [&[lower, upper, multiplier][..], &x, &nearest, &n];

@@ -18,6 +18,7 @@ use super::answer::CapsuleDistance;
 use super::shape::Capsule;
 use crate::body::ClosedForm;
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
@@ -76,12 +77,52 @@ const PARALLEL: f64 = 8.0 * f64::EPSILON;
 /// tried: all are valid.
 const CROSSING: f64 = 1e-3;
 
-/// The signed distance of two capsules, as narrow as rounding allows. Never tied.
-pub(super) fn of_axes(a: &Axis, b: &Axis, tolerance: f64) -> CapsuleDistance {
+/// The way from the middle of an axis to that of another, and a bound of the error of all ways
+/// between their points, metres.
+fn between_middles(a: &Axis, b: &Axis) -> (Vector3<f64>, f64) {
     let between = (a.translation - b.translation) + (a.offset - b.offset);
     let size = between.norm() + a.half + b.half + a.offset.norm() + b.offset.norm();
     // Lengths below 1e-162 m have squares of 0.
-    let error = a.error + b.error + gamma(16) * size + 1e-160;
+    (between, a.error + b.error + gamma(16) * size + 1e-160)
+}
+
+/// A bracket of the distance of the axes less the radii, metres.
+fn less_radii([lower, upper]: [f64; 2], a: &Axis, b: &Axis) -> [f64; 2] {
+    let radius = a.radius + b.radius;
+    let rounding = 2.0 * f64::EPSILON * (radius + upper);
+    [lower - radius - rounding, upper - radius + rounding]
+}
+
+/// A bracket of the signed distance of two capsules, metres, as far as it may decide: by the balls
+/// around them, and else by points of the axes that are about the nearest and the planes across the
+/// way between these.
+pub(super) fn bounds_of_axes(a: &Axis, b: &Axis, goal: &StopCriterion) -> [f64; 2] {
+    let (between, error) = between_middles(a, b);
+    let apart = between.norm();
+    let by_balls = less_radii([apart - a.half - b.half - error, apart + error], a, b);
+    if goal.met(by_balls[0], by_balls[1]) {
+        return by_balls;
+    }
+    let (u, v) = (a.along, b.along);
+    // Each is the nearest to the last one.
+    let t = v.dot(&between).clamp(-b.half, b.half);
+    let s = u.dot(&(v * t - between)).clamp(-a.half, a.half);
+    let t = v.dot(&(between + u * s)).clamp(-b.half, b.half);
+    let way = between + u * s - v * t;
+    let length = way.norm();
+    // Not along a way that is all rounding, or of no length.
+    let gap = if length > error { gap_along(&(way / length), &between, a, b) - error } else { by_balls[0] };
+    less_radii([gap, length + error], a, b)
+}
+
+/// The gap between the axes across a unit vector, by the way between their middles, metres.
+fn gap_along(n: &Vector3<f64>, between: &Vector3<f64>, a: &Axis, b: &Axis) -> f64 {
+    n.dot(between) - a.half * n.dot(&a.along).abs() - b.half * n.dot(&b.along).abs()
+}
+
+/// The signed distance of two capsules, as narrow as rounding allows. Never tied.
+pub(super) fn of_axes(a: &Axis, b: &Axis, tolerance: f64) -> CapsuleDistance {
+    let (between, error) = between_middles(a, b);
     let (u, v) = (a.along, b.along);
     let nearest_of_a = |t: f64| (u.dot(&(v * t - between))).clamp(-a.half, a.half);
     let nearest_of_b = |s: f64| (v.dot(&(between + u * s))).clamp(-b.half, b.half);
@@ -110,9 +151,7 @@ pub(super) fn of_axes(a: &Axis, b: &Axis, tolerance: f64) -> CapsuleDistance {
     let upper = way.norm() + error;
     let inner = [s.abs() < a.half, t.abs() < b.half];
     let (lower, n) = parting((a, b), (&between, &way), &across, inner, error);
-    let (lower, radius) = (lower - error, a.radius + b.radius);
-    let rounding = 2.0 * f64::EPSILON * (radius + upper);
-    let (lower, upper) = (lower - radius - rounding, upper - radius + rounding);
+    let [lower, upper] = less_radii([lower - error, upper], a, b);
     // Below rounding there is no direction from one axis to the other.
     let normal = (way.norm() > error).then_some(n);
     let (x, y) = (a.at(s), b.at(t));
@@ -152,7 +191,7 @@ fn parting(
     } else {
         beside(beside(*way, &u), &v)
     };
-    let gap = |n: &Vector3<f64>| n.dot(between) - a.half * n.dot(&u).abs() - b.half * n.dot(&v).abs();
+    let gap = |n: &Vector3<f64>| gap_along(n, between, a, b);
     let mut best = (f64::NEG_INFINITY, Vector3::zeros());
     let ways = [*way, beside(*way, &u), beside(*way, &v), both];
     for way in ways {

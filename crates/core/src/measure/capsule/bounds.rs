@@ -1,8 +1,9 @@
 //! Bounds of the signed distance of a body from a capsule by balls and a plane: no polynomial is
 //! evaluated.
 
+use super::axes::{Axis, bounds_of_axes};
 use super::shape::Capsule;
-use crate::body::Body;
+use crate::body::{Ball, Body};
 use crate::measure::bounds::culling::{CULLING_SLACK, across};
 use crate::measure::bounds::separation::across_gap;
 use crate::measure::frames::pose::ROTATION_ERROR;
@@ -13,12 +14,17 @@ use nalgebra::Vector3;
 
 /// A bracket of the signed distance of a body from a capsule, metres, as far as it may decide.
 pub(super) fn early_bounds(of_body: At<'_, Body>, of_capsule: At<'_, Capsule>, goal: &StopCriterion) -> [f64; 2] {
-    let form = of_body.0.closed_form().filter(|_| runs(Stage::ClosedForm));
-    if form.is_some_and(|form| form.shape().ball_radius_m().is_some()) {
-        // The closed form of the axes costs no more than bounds.
-        return [f64::NEG_INFINITY, f64::INFINITY];
+    if runs(Stage::ClosedForm)
+        && let Some(form) = of_body.0.closed_form()
+        && let Some(ball) = Axis::of_ball(form, of_body.1)
+    {
+        return bounds_of_axes(&ball, &Axis::of_capsule(of_capsule.0, of_capsule.1), goal);
     }
-    let lower = if runs(Stage::Balls) { ball_gap(of_body, of_capsule) } else { f64::NEG_INFINITY };
+    let lower = if runs(Stage::Balls) {
+        axis_gap((of_body.0.circumscribed(), of_body.1), of_capsule)
+    } else {
+        f64::NEG_INFINITY
+    };
     if lower > goal.far {
         return [lower, f64::INFINITY];
     }
@@ -26,12 +32,15 @@ pub(super) fn early_bounds(of_body: At<'_, Body>, of_capsule: At<'_, Capsule>, g
     [lower.max(across), upper]
 }
 
-/// Lower bound by the ball about the body and that about the capsule, metres.
-pub(super) fn ball_gap((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> f64 {
-    let ball = body.circumscribed();
-    let (_, apart, error) = across((pose, &ball.center), (capsule_pose, &Vector3::zeros()));
-    let reach = ball.radius + capsule.reach_m();
-    apart - reach - error - CULLING_SLACK * (apart + reach)
+/// Lower bound of the signed distance of all that is in a ball of the frame of a pose from the
+/// capsule, metres.
+pub(super) fn axis_gap((ball, pose): At<'_, Ball>, (capsule, capsule_pose): At<'_, Capsule>) -> f64 {
+    let (between, apart, error) = across((pose, &ball.center), (capsule_pose, &Vector3::zeros()));
+    let (half, reach) = (capsule.half_height_m(), ball.radius + capsule.reach_m());
+    let axis = capsule_pose.transform_direction(&Vector3::z());
+    let beside = (between - axis * axis.dot(&between).clamp(-half, half)).norm();
+    let rounding = error + ROTATION_ERROR * half + CULLING_SLACK * (apart + reach);
+    beside - ball.radius - capsule.radius_m() - rounding
 }
 
 /// From above by the ball about the body's interior point, from below by a plane across the gap

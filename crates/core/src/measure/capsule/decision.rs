@@ -2,12 +2,13 @@
 //! balls, by planes whose heights are looked up, and by a search that stops as soon as its bracket
 //! decides.
 
+use super::answer::CapsuleDistance;
 use super::shape::Capsule;
 use super::solid::distance_until;
 use crate::body::Solid;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::overlap::{Decision, ThresholdError, check, decision};
+use crate::measure::overlap::{Decision, ThresholdError, WithinMargin, check, decision};
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
@@ -82,6 +83,46 @@ pub fn nearer_to_capsule_than(
     }
     // Below the threshold is at most the number before it.
     Ok(decide((solid, pose), (capsule, capsule_pose), threshold.next_down(), options, warm))
+}
+
+/// The signed distance of a solid from a capsule, as accurate as
+/// [`crate::measure::distance_to_capsule`] gives it, unless it is proven to exceed `margin` metres:
+/// then it is not worked out. `warm` as in [`crate::measure::distance_to_capsule`].
+///
+/// # Errors
+/// A margin that is negative or not finite.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use sublevel_core::body::Body;
+/// use sublevel_core::measure::{Capsule, Options, Pose, WarmStart, WithinMargin};
+/// use sublevel_core::measure::within_margin_of_capsule;
+///
+/// let crate_ = Body::cuboid("crate", Vector3::new(0.5, 0.5, 0.5))?;
+/// let forearm = Capsule::new(0.1, 0.3)?;
+/// let beside = Pose::from_quaternion(Vector3::new(1.0, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
+/// let (origin, options) = (Pose::identity(), Options::default());
+/// let test = |m| {
+///     let mut warm = WarmStart::default();
+///     within_margin_of_capsule(&crate_, &origin, &forearm, &beside, m, &options, &mut warm)
+/// };
+/// assert!(matches!(test(0.5)?, WithinMargin::Within(found) if (found.value() - 0.4).abs() < 1e-8));
+/// assert!(matches!(test(0.3)?, WithinMargin::Beyond { lower } if lower > 0.3));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn within_margin_of_capsule(
+    solid: &impl Solid,
+    pose: &Pose,
+    capsule: &Capsule,
+    capsule_pose: &Pose,
+    margin: f64,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> Result<WithinMargin<CapsuleDistance>, ThresholdError> {
+    check(margin)?;
+    let goal = StopCriterion::beyond(margin);
+    let found = distance_until((solid, pose), (capsule, capsule_pose), goal, options, warm);
+    Ok(if found.lower > margin { WithinMargin::Beyond { lower: found.lower } } else { WithinMargin::Within(found) })
 }
 
 /// Whether the signed distance is at most this, metres.

@@ -14,6 +14,8 @@
 mod answer;
 mod axes;
 mod bounds;
+mod capsules;
+mod capsules_decision;
 mod decision;
 mod pair;
 mod shape;
@@ -25,8 +27,9 @@ use crate::measure::options::Options;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
 pub use answer::CapsuleDistance;
-use axes::{Axis, of_axes};
-pub use decision::{nearer_to_capsule_than, overlap_with_capsule};
+pub use capsules::distance_of_capsules;
+pub use capsules_decision::{capsules_nearer_than, capsules_within_margin, overlap_of_capsules};
+pub use decision::{nearer_to_capsule_than, overlap_with_capsule, within_margin_of_capsule};
 pub(in crate::measure) use pair::Problem;
 pub use shape::{Capsule, CapsuleError};
 use solid::distance_until;
@@ -61,34 +64,6 @@ pub fn distance_to_capsule(
     warm: &mut WarmStart,
 ) -> CapsuleDistance {
     distance_until((solid, pose), (capsule, capsule_pose), StopCriterion::NARROW, options, warm)
-}
-
-/// Signed distance of two capsules where they stand: positive apart, minus the penetration depth in
-/// overlap, which is the sum of the radii where their axes meet. The witnesses are those of the
-/// first and of the second, the normal leads from the second to the first.
-///
-/// ```
-/// use nalgebra::Vector3;
-/// use sublevel_core::measure::{Capsule, Options, Pose, distance_of_capsules};
-///
-/// let limb = Capsule::new(0.05, 0.2)?;
-/// let beside = Pose::from_quaternion(Vector3::new(0.3, 0.0, 0.0), [0.0, 0.0, 0.0, 1.0])?;
-/// let found = distance_of_capsules(&limb, &Pose::identity(), &limb, &beside, &Options::default());
-/// assert!((found.value() - 0.2).abs() < 1e-8);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-pub fn distance_of_capsules(
-    a: &Capsule,
-    pose_a: &Pose,
-    b: &Capsule,
-    pose_b: &Pose,
-    options: &Options<'_>,
-) -> CapsuleDistance {
-    let size = [a.reach_m(), b.reach_m()].into_iter().filter(|&reach| reach > 0.0).fold(f64::INFINITY, f64::min);
-    let between = (pose_a.translation() - pose_b.translation()).norm();
-    // Two points have no size but their distance.
-    let tolerance = options.accuracy() * if size.is_finite() { size } else { between };
-    of_axes(&Axis::of_capsule(a, pose_a), &Axis::of_capsule(b, pose_b), tolerance)
 }
 
 #[cfg(test)]

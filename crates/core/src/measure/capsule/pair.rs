@@ -52,6 +52,7 @@ const LEVEL: f64 = 1e-7;
 const MORE_PLACES: u32 = 12;
 
 /// A capsule where it stands, and how its distance is to be solved.
+#[derive(Clone, Copy)]
 pub(in crate::measure) struct Problem<'a> {
     pub(in crate::measure) capsule: &'a Capsule,
     pub(in crate::measure) capsule_pose: &'a Pose,
@@ -105,7 +106,7 @@ impl Problem<'_> {
         let starts = if matches!(warm.hint, Hint::Cold) { &starts[..1] } else { &starts };
         for floor in ROUNDING_FLOORS.map(|floor| floor * size) {
             for start in starts {
-                if floor > self.tolerance && self.goal.is_narrow() && !self.options.exhausted(spent) {
+                if floor > self.tolerance && self.goal.wants_answer() && !self.options.exhausted(spent) {
                     *warm = *start;
                     match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
                         Ok(found) => {

@@ -45,6 +45,13 @@ impl<'a> Exact<'a> {
         Some(Self { free, shape, form, swapped })
     }
 
+    /// The same, or two balls, of which the first counts as the one without a closed form.
+    #[inline(always)]
+    pub(in crate::measure) fn beside_form(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Option<Self> {
+        let balls = || Some(Self { free: of_a, shape: of_b, form: of_b.0.closed_form()?, swapped: false });
+        Self::new(of_a, of_b).or_else(balls)
+    }
+
     /// The pair, if it is one and both have edges.
     pub(super) fn edged(of_a: (&'a Body, &'a Pose), of_b: (&'a Body, &'a Pose)) -> Option<Self> {
         if of_a.0.is_smooth() || of_b.0.is_smooth() {

@@ -10,10 +10,11 @@ mod planes;
 mod query;
 mod search;
 
-use crate::body::{Ball, Body, NodeContent, PartNode, PartTree, Solid};
+use crate::body::{Body, PartNode, Solid};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{At, TreePair, nearest as nearest_parts};
+use crate::measure::pairwise_minimum::{At, nearest as nearest_parts};
+use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
@@ -68,26 +69,26 @@ pub(super) fn distance_until(
     }
     let radius = a.circumscribed().radius.min(b.circumscribed().radius);
     let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
-    let (tree_a, tree_b) = (a.tree().map_or(&own_a[..], PartTree::nodes), b.tree().map_or(&own_b[..], PartTree::nodes));
-    let balls = TreePair::new((tree_a, pose_a), (tree_b, pose_b));
-    let mut found = closest((a.parts(), pose_a), (b.parts(), pose_b), &balls, goal, (options, warm));
+    let (nodes_a, nodes_b) = (nodes(a, &own_a), nodes(b, &own_b));
+    let mut found = closest(((a.parts(), nodes_a), pose_a), ((b.parts(), nodes_b), pose_b), goal, (options, warm));
     found.status = Status::of(found.upper - found.lower <= options.accuracy() * radius);
     found
 }
 
-/// The tree of a single part.
-fn only_node(ball: &Ball) -> [PartNode; 1] {
-    [PartNode { ball: *ball, content: NodeContent::Part(0) }]
-}
+/// Parts with the nodes of their tree, where they stand.
+type Parts<'a> = ((&'a [Body], &'a [PartNode]), &'a Pose);
 
+/// Not generic, so that it is compiled with this crate, whatever its callers are compiled for.
 fn closest(
-    (a, pose_a): At<'_, [Body]>,
-    (b, pose_b): At<'_, [Body]>,
-    balls: &TreePair<'_>,
+    ((a, nodes_a), pose_a): Parts<'_>,
+    ((b, nodes_b), pose_b): Parts<'_>,
     goal: &StopCriterion,
     (options, warm): (&Options<'_>, &mut WarmStart),
 ) -> Distance {
-    let found = nearest_parts(balls, goal.near.max(0.0), warm, |(i, j), nearest, hint| {
+    let trees = ball_gaps((nodes_a, pose_a), (nodes_b, pose_b));
+    // Nothing is nearer than 0.
+    let end = StopCriterion { near: goal.near.max(0.0), far: goal.far };
+    let found = nearest_parts(&trees, &end, warm, |(i, j), nearest, hint| {
         let goal = StopCriterion { near: goal.near, far: goal.far.min(nearest) };
         settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
     });

@@ -28,11 +28,13 @@ mod problem;
 #[cfg(test)]
 mod tests;
 
-use crate::body::{Body, Solid};
-use crate::measure::bounds::culling::{CULLING_SLACK, across};
+use crate::body::{Body, PartCenters, PartNode, Solid};
+use crate::measure::bounds::culling::CULLING_SLACK;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{At, least};
+use crate::measure::pairwise_minimum::nearest;
+use crate::measure::part_pairs::{NodeBound, SeenFrame, TreePair, centers, nodes, only_centers, only_node};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::GrowthDistance;
@@ -77,20 +79,29 @@ pub fn growth_distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
-    match (a.parts(), b.parts()) {
-        ([a], [b]) => between((a, pose_a), (b, pose_b), options, warm),
-        (a, b) => first_to_touch((a, pose_a), (b, pose_b), options, warm),
+    if let ([a], [b]) = (a.parts(), b.parts()) {
+        return between((a, pose_a), (b, pose_b), options, warm);
     }
+    let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
+    let (own_centers_a, own_centers_b) = (only_centers(a.parts()), only_centers(b.parts()));
+    let of_a = (a.parts(), nodes(a, &own_a), centers(a, &own_centers_a));
+    let of_b = (b.parts(), nodes(b, &own_b), centers(b, &own_centers_b));
+    first_to_touch((of_a, pose_a), (of_b, pose_b), options, warm)
 }
 
+/// Parts with the nodes of their tree, and their centres.
+type Parts<'a> = (&'a [Body], &'a [PartNode], &'a [PartCenters]);
+
 fn first_to_touch(
-    (a, pose_a): At<'_, [Body]>,
-    (b, pose_b): At<'_, [Body]>,
+    ((a, nodes_a, centers_a), pose_a): (Parts<'_>, &Pose),
+    ((b, nodes_b, centers_b), pose_b): (Parts<'_>, &Pose),
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
-    let bound = |(i, j): (usize, usize)| growth_bound((&a[i], pose_a), (&b[j], pose_b));
-    let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
+    let seen = SeenFrame::new(pose_a, pose_b);
+    let bound = |i: usize, j: usize| NodeBound::of(growth_bound(&seen, &centers_a[i], &centers_b[j]));
+    let trees = TreePair::new(nodes_a, nodes_b, bound);
+    let found = nearest(&trees, &StopCriterion::NARROW, warm, |(i, j), _, hint| {
         between((&a[i], pose_a), (&b[j], pose_b), options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.max(1.0);
@@ -98,13 +109,14 @@ fn first_to_touch(
     GrowthDistance { status: Status::of(narrow), lower, tied, iterations, ..found.best }
 }
 
-/// Lower bound of the growth distance from balls about the centres: the distance of these over the
-/// sum of their radii.
-pub(super) fn growth_bound((a, pose_a): At<'_, Body>, (b, pose_b): At<'_, Body>) -> f64 {
-    let reach = |body: &Body| {
-        let (center, ball) = (body.growth_ball().center, body.circumscribed());
-        (center - ball.center).norm() + ball.radius
-    };
-    let (_, apart, error) = across((pose_a, &a.growth_ball().center), (pose_b, &b.growth_ball().center));
-    (apart - error) / (reach(a) + reach(b)) * (1.0 - CULLING_SLACK)
+/// Lower bound of the growth distance of any two parts in two nodes.
+///
+/// A part lies in the ball of its reach R about its centre, and grown by s in that of s R: where two
+/// touch, `|Δ| <= s (R_A + R_B)`. Of all parts in two nodes |Δ| is at least the gap between two
+/// balls that contain the centres, and R at most the largest reach. Where those balls meet, the
+/// quotient is negative: it bounds nothing, and still says which nodes are likelier.
+pub(super) fn growth_bound(seen: &SeenFrame, of_a: &PartCenters, of_b: &PartCenters) -> f64 {
+    let (of_a, of_b) = (&of_a.growth, &of_b.growth);
+    let quotient = seen.gap(&of_a.ball, &of_b.ball) / (of_a.reach + of_b.reach);
+    quotient - CULLING_SLACK * quotient.abs()
 }

@@ -2,10 +2,10 @@
 
 use super::answer::HalfSpaceDistance;
 use super::set::HalfSpace;
-use crate::body::{Body, Solid};
+use crate::body::{Ball, Body, Solid};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{At, Least, least};
+use crate::measure::pairwise_minimum::{At, Least, nearest_part};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::support_point::{Asked, Height, SupportPoint, height};
 use crate::measure::status::Status;
@@ -34,11 +34,13 @@ pub(super) fn distance_until(
     if let [body] = parts {
         return ask.of_body((body, pose), warm);
     }
-    let bound = |(i, _): (usize, usize)| {
-        let above = Above::new((&parts[i], pose), half_space);
-        above.of(&parts[i].circumscribed().center, parts[i].circumscribed().radius)[0]
+    let (normal, place) = (half_space.normal(), pose.translation());
+    let bound = |ball: &Ball| {
+        let center = pose.transform_point(&ball.center);
+        let size = place.norm() + ball.center.norm() + half_space.offset().abs() + ball.radius;
+        normal.dot(&center) - half_space.offset() - ball.radius - (ROTATION_ERROR + gamma(16)) * size
     };
-    let found = least((parts.len(), 1), bound, goal.near, warm, |(i, _), _, hint| ask.of_body((&parts[i], pose), hint));
+    let found = nearest_part(solid, bound, &goal, warm, |i, _, hint| ask.of_body((&parts[i], pose), hint));
     let Least { best, lower, tied, iterations, .. } = found;
     HalfSpaceDistance { status: Status::of(best.upper - lower <= tolerance), lower, tied, iterations, ..best }
 }

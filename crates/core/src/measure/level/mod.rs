@@ -8,11 +8,13 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-use crate::body::{Body, Solid};
-use crate::measure::bounds::culling::{CULLING_SLACK, across};
+use crate::body::{Ball, Body, Centers, PartCenters, PartNode, Solid};
+use crate::measure::bounds::culling::CULLING_SLACK;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{At, least};
+use crate::measure::pairwise_minimum::nearest;
+use crate::measure::part_pairs::{NodeBound, SeenFrame, TreePair, centers, nodes, only_centers, only_node};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::LevelDistance;
@@ -56,20 +58,29 @@ pub fn level_distance(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
-    match (a.parts(), b.parts()) {
-        ([a], [b]) => between((a, pose_a), (b, pose_b), options, warm),
-        (a, b) => lowest((a, pose_a), (b, pose_b), options, warm),
+    if let ([a], [b]) = (a.parts(), b.parts()) {
+        return between((a, pose_a), (b, pose_b), options, warm);
     }
+    let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
+    let own_centers = only_centers(a.parts());
+    let (nodes_a, nodes_b, centers) = (nodes(a, &own_a), nodes(b, &own_b), centers(a, &own_centers));
+    let (of_a, of_b) = ((a.parts(), nodes_a), (b.parts(), nodes_b));
+    lowest((of_a, centers, pose_a), (of_b, pose_b), options, warm)
 }
 
+/// Parts with the nodes of their tree.
+type Parts<'a> = (&'a [Body], &'a [PartNode]);
+
 fn lowest(
-    (a, pose_a): At<'_, [Body]>,
-    (b, pose_b): At<'_, [Body]>,
+    ((a, nodes_a), centers, pose_a): (Parts<'_>, &[PartCenters], &Pose),
+    ((b, nodes_b), pose_b): (Parts<'_>, &Pose),
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> LevelDistance {
-    let bound = |(i, j): (usize, usize)| level_bound((&a[i], pose_a), (&b[j], pose_b));
-    let found = least((a.len(), b.len()), bound, f64::NEG_INFINITY, warm, |(i, j), _, hint| {
+    let seen = SeenFrame::new(pose_a, pose_b);
+    let bound = |i: usize, j: usize| level_bound(&seen, &centers[i], &nodes_b[j].ball);
+    let trees = TreePair::new(nodes_a, nodes_b, bound);
+    let found = nearest(&trees, &StopCriterion::NARROW, warm, |(i, j), _, hint| {
         between((&a[i], pose_a), (&b[j], pose_b), options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.abs().max(1.0);
@@ -77,15 +88,26 @@ fn lowest(
     LevelDistance { status: Status::of(narrow), lower, tied, iterations, ..found.best }
 }
 
-/// Lower bound of the level distance from B's circumscribed ball: along a ray from the interior
-/// point c a convex p with p(c) < 1 that is 1 within the reach R is at least `p(c) + (1 - p(c)) r /
-/// R` at r >= R.
-pub(super) fn level_bound((a, pose_a): At<'_, Body>, (b, pose_b): At<'_, Body>) -> f64 {
-    let (own, other) = (a.circumscribed(), b.circumscribed());
-    let (_, apart, error) = across((pose_a, a.interior_point()), (pose_b, &other.center));
-    let reach = (a.interior_point() - own.center).norm() + own.radius;
-    let times = ((apart - error - other.radius) / reach - CULLING_SLACK * (apart + other.radius) / reach)
-        * (1.0 - CULLING_SLACK);
-    let least = a.min_value();
-    if times > 1.0 { least + (1.0 - least) * times - CULLING_SLACK * times } else { f64::NEG_INFINITY }
+/// Lower bound of the level distance of any part in a node of A over any part in a ball of B.
+///
+/// Along a ray from its interior point c the largest constraint p of a part is convex, with p(c) at
+/// most m < 1, and 1 at a distance of at most the part's reach. So at r, t >= 1 times as far as
+/// that,
+///
+/// ```text
+/// p >= p(c) + (1 - p(c)) t >= m + (1 - m) t,
+/// ```
+///
+/// the second because t >= 1, so that the smaller p(c), the larger the left side. That increases
+/// with t and decreases with m: the largest m and reach of the parts in a node, and the smallest r,
+/// from a ball that contains their interior points, bound all of them. Nearer than that nothing is
+/// proven, and the nodes come in the order of t, which is at most 1, as what is proven never is.
+pub(super) fn level_bound(seen: &SeenFrame, of_a: &PartCenters, of_b: &Ball) -> NodeBound {
+    let PartCenters { interior: Centers { ball, reach }, min_value, .. } = of_a;
+    let times = seen.gap(ball, of_b) / reach * (1.0 - CULLING_SLACK);
+    if times > 1.0 {
+        NodeBound::of(min_value + (1.0 - min_value) * times - CULLING_SLACK * (1.0 + min_value.abs()) * times)
+    } else {
+        NodeBound { lower: f64::NEG_INFINITY, order: times }
+    }
 }

@@ -6,11 +6,12 @@ mod pair;
 mod tests;
 
 use crate::body::Solid;
-use crate::measure::bounds::culling::ball_gap;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::pairwise_minimum::{Least, least};
+use crate::measure::pairwise_minimum::{Least, nearest};
+use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
 use crate::measure::signed::separating_translation::{self, Start, Starts, narrow};
+use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::Penetration;
@@ -63,16 +64,16 @@ pub fn penetration(
         return between((a, pose_a), (b, pose_b), options, warm);
     }
     let (mut starts, mut directions) = (Starts::default(), 0);
-    let gap = |(i, j): (usize, usize)| ball_gap((&parts_a[i], pose_a), (&parts_b[j], pose_b));
-    let Least { best, iterations, .. } =
-        least((parts_a.len(), parts_b.len()), gap, f64::NEG_INFINITY, warm, |pair, _, hint| {
-            let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
-            directions += found.directions;
-            if let Some(direction) = found.direction {
-                starts.push(Start { pair, direction, depth: found.upper });
-            }
-            found
-        });
+    let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
+    let trees = ball_gaps((nodes(a, &own_a), pose_a), (nodes(b, &own_b), pose_b));
+    let Least { best, iterations, .. } = nearest(&trees, &StopCriterion::NARROW, warm, |pair, _, hint| {
+        let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
+        directions += found.directions;
+        if let Some(direction) = found.direction {
+            starts.push(Start { pair, direction, depth: found.upper });
+        }
+        found
+    });
     if starts.is_empty() {
         return Penetration { directions, iterations, ..best };
     }

@@ -10,13 +10,14 @@
 //! translation from which no small change is shorter, which need not be the shortest of all.
 
 use super::pair::between;
-use crate::body::{Body, Solid};
-use crate::measure::bounds::culling::{across, ball_gap};
+use crate::body::{Body, PartNode, Solid};
+use crate::measure::bounds::culling::across;
 use crate::measure::distance::settle;
 use crate::measure::frames::pose::Pose;
 use crate::measure::half_space::{HalfSpace, distance_to_half_space};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
+use crate::measure::part_pairs::{NodeBound, TreePair, ball_gaps, nodes, only_node};
 use crate::measure::solver::min_norm_point::{Bound, Shortest, shortest};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
@@ -126,9 +127,11 @@ pub(in crate::measure) fn separate(
     // Gaps are to be provable whatever accuracy the caller asks for.
     let options = asked.with_accuracy(asked.accuracy().min(1e-9)).unwrap_or(*asked);
     let narrow = |depth: f64| narrow(a, b, depth, asked);
+    let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
     let mut search = Search {
         a: a.parts(),
         b: b.parts(),
+        nodes: [nodes(a, &own_a), nodes(b, &own_b)],
         pose_a: pose_a.with_translation(Vector3::zeros()),
         pose_b: pose_b.with_translation(pose_b.translation() - pose_a.translation()),
         least,
@@ -169,6 +172,8 @@ pub(in crate::measure) fn separate(
 struct Search<'a> {
     a: &'a [Body],
     b: &'a [Body],
+    /// Of the trees of A and of B.
+    nodes: [&'a [PartNode]; 2],
     pose_a: Pose,
     pose_b: Pose,
     /// No separating translation is shorter: proven.
@@ -178,10 +183,11 @@ struct Search<'a> {
     iterations: u32,
 }
 
-impl Search<'_> {
-    fn pairs(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let (len_a, len_b) = (self.a.len(), self.b.len());
-        (0..len_a).flat_map(move |i| (0..len_b).map(move |j| (i, j)))
+impl<'a> Search<'a> {
+    /// The trees with the gaps of their balls, A being at this pose.
+    fn trees(&self, pose: &Pose) -> TreePair<'a, impl Fn(usize, usize) -> NodeBound + use<'a>> {
+        let [a, b] = self.nodes;
+        ball_gaps((a, pose), (b, &self.pose_b))
     }
 
     /// The translation that separates the circumscribed balls.
@@ -242,14 +248,16 @@ impl Search<'_> {
         // Not 0: a translation has a direction.
         let mut length = start.depth.max(1e-3 * self.margin);
         loop {
+            // Those that a longer translation brings together are met in the next turn.
             let before = length;
-            for pair in self.pairs() {
+            if !(length < limit) {
+                return None;
+            }
+            let trees = self.trees(&self.pose_after(&(n * length)));
+            for pair in trees.within(0.0) {
                 let pose = self.pose_after(&(n * length));
                 if !(length < limit) || self.ended() {
                     return None;
-                }
-                if ball_gap((&self.a[pair.0], &pose), (&self.b[pair.1], &self.pose_b)) > 0.0 {
-                    continue;
                 }
                 let depth = if pair == start.pair { start.depth } else { self.depth_along(pair, n) };
                 if depth > length && !self.apart(pair, &pose) {
@@ -265,8 +273,8 @@ impl Search<'_> {
     /// Whether all pairs are proven apart after a translation, or to touch at most.
     fn separates(&mut self, translation: &Vector3<f64>) -> bool {
         let (pose, length) = (self.pose_after(translation), translation.norm());
-        let pairs = self.pairs();
-        pairs.into_iter().all(|pair| {
+        let trees = self.trees(&pose);
+        trees.within(0.0).all(|pair| {
             self.apart(pair, &pose) || length > 0.0 && self.depth_along(pair, &(translation / length)) <= length
         })
     }
@@ -304,7 +312,8 @@ impl Search<'_> {
         // The shortest w beyond planes that v is beyond has |w - v|² <= |v|² - |w|²: pairs that are
         // farther do not count.
         let far = (length * length - self.least * self.least).max(0.0).sqrt() + 4.0 * margin.max(self.margin);
-        for (i, j) in self.pairs() {
+        let trees = self.trees(&pose);
+        for (i, j) in trees.within(far) {
             if self.ended() {
                 return None;
             }

@@ -1,9 +1,11 @@
 //! Unions against loops over the pairs of their parts.
 
 use super::{random_pose, twisted};
-use crate::body::{Body, Compound};
+use crate::body::{Body, Compound, NodeContent, PartTree, Solid};
 use crate::measure::growth::growth_bound;
 use crate::measure::level::level_bound;
+use crate::measure::part_pairs::SeenFrame;
+use crate::measure::part_pairs::count::touched;
 use crate::measure::*;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::OnceLock;
@@ -165,22 +167,194 @@ fn levels_and_growths_are_those_of_the_least_pair() {
     }
 }
 
+/// Of capsules and points the nearest part counts, too, with hints and without; and decisions agree.
 #[test]
-fn cheap_bounds_are_bounds() {
+fn capsules_and_points_are_as_far_as_the_nearest_part() {
     let options = Options::default();
-    let mut useful = 0;
-    for seed in 0..100 {
-        let (a, b, pose_a, pose_b) = scene(seed);
-        for (p, q) in a.parts().iter().zip(b.parts()) {
-            let level = level_bound((p, &pose_a), (q, &pose_b));
-            let growth = growth_bound((p, &pose_a), (q, &pose_b));
-            let warm = &mut WarmStart::default();
-            assert!(level <= level_distance(p, &pose_a, q, &pose_b, &options, warm).upper, "seed {seed}");
-            assert!(growth <= growth_distance(p, &pose_a, q, &pose_b, &options, warm).upper, "seed {seed}");
-            useful += u32::from(level > 1.0);
+    let mut sides = [0; 2];
+    for seed in 0..300 {
+        let (a, _, pose_a, pose_b) = scene(seed);
+        let capsule = Capsule::new([0.2, 0.0][(seed / 4 % 2) as usize], [0.5, 0.0, 2.0][(seed % 3) as usize]).unwrap();
+        let (mut warm, mut of_decisions, mut of_points) = Default::default();
+        for k in 0..3 {
+            let pose = pose_b.with_translation(pose_b.translation() + Vector3::new(0.1, -0.05, 0.1) * f64::from(k));
+            let least = |measure: &dyn Fn(&Body) -> [f64; 2]| {
+                a.parts()
+                    .iter()
+                    .map(measure)
+                    .fold([f64::INFINITY; 2], |[l, u], [lower, upper]| [l.min(lower), u.min(upper)])
+            };
+            let [lower, upper] = least(&|part| {
+                let found = distance_to_capsule(part, &pose_a, &capsule, &pose, &options, &mut WarmStart::default());
+                [found.lower, found.upper]
+            });
+            let found = distance_to_capsule(a, &pose_a, &capsule, &pose, &options, &mut warm);
+            let label = format!("seed {seed} step {k}: {found:?} against {lower} {upper}");
+            assert!(found.lower <= upper && lower <= found.upper, "{label}");
+            assert!(found.lower > 0.0 || upper < 1e-9, "{label}");
+            sides[usize::from(found.lower > 0.0)] += 1;
+            if found.lower > 0.0 {
+                assert_eq!(found.status, Status::Converged, "{label}");
+            }
+            match overlap_with_capsule(a, &pose_a, &capsule, &pose, &options, &mut of_decisions) {
+                Decision::Yes => assert!(lower <= 0.0, "{label}"),
+                Decision::No => assert!(upper > 0.0, "{label}"),
+                Decision::Undecided { .. } => assert!(lower <= 0.0 && upper > 0.0, "{label}"),
+            }
+            for threshold in [0.7, 1.3].map(|factor| factor * upper.max(0.1)) {
+                let nearer =
+                    nearer_to_capsule_than(a, &pose_a, &capsule, &pose, threshold, &options, &mut of_decisions);
+                let expected = if upper < threshold { Decision::Yes } else { Decision::No };
+                assert_eq!(nearer, Ok(expected), "{label} below {threshold}");
+                let mut cold = WarmStart::default();
+                let within = within_margin_of_capsule(a, &pose_a, &capsule, &pose, threshold, &options, &mut cold);
+                match within.unwrap() {
+                    WithinMargin::Beyond { lower } => assert!(lower > threshold && lower <= upper, "{label}"),
+                    WithinMargin::Within(found) => {
+                        assert!(
+                            found.lower <= upper && lower <= found.upper && upper <= threshold,
+                            "{label}: {found:?}"
+                        );
+                    }
+                }
+            }
+            let point = *pose.translation();
+            let [lower, upper] = least(&|part| {
+                let found = distance_to_point(part, &pose_a, &point, &options, &mut WarmStart::default()).unwrap();
+                [found.lower, found.upper]
+            });
+            let found = distance_to_point(a, &pose_a, &point, &options, &mut of_points).unwrap();
+            let label = format!("seed {seed} step {k}: {found:?} against {lower} {upper}");
+            assert!(found.lower <= upper && lower <= found.upper && found.status == Status::Converged, "{label}");
         }
     }
-    assert!(useful > 20, "{useful}");
+    assert!(sides.iter().all(|&count| count > 100), "{sides:?}");
+}
+
+/// All bounds of nodes hold of all parts in them.
+#[test]
+fn bounds_of_nodes_hold_of_their_parts() {
+    let options = Options::default();
+    let mut useful = [0; 2];
+    for seed in 0..40 {
+        let (a, b, pose_a, pose_b) = scene(seed);
+        let seen = SeenFrame::new(&pose_a, &pose_b);
+        let [tree_a, tree_b] = [a, b].map(|solid| solid.tree().expect("a compound has a tree"));
+        let measured: Vec<Vec<_>> = a
+            .parts()
+            .iter()
+            .map(|p| {
+                b.parts()
+                    .iter()
+                    .map(|q| {
+                        let warm = || WarmStart::default();
+                        let signed = signed_distance(p, &pose_a, q, &pose_b, &options, &mut warm()).upper;
+                        let level = level_distance(p, &pose_a, q, &pose_b, &options, &mut warm()).upper;
+                        (signed, level, growth_distance(p, &pose_a, q, &pose_b, &options, &mut warm()).upper)
+                    })
+                    .collect()
+            })
+            .collect();
+        for i in 0..tree_a.nodes().len() {
+            for j in 0..tree_b.nodes().len() {
+                let gap = seen.gap(&tree_a.nodes()[i].ball, &tree_b.nodes()[j].ball);
+                let level = level_bound(&seen, &tree_a.centers()[i], &tree_b.nodes()[j].ball).lower;
+                let growth = growth_bound(&seen, &tree_a.centers()[i], &tree_b.centers()[j]);
+                for p in parts_of(tree_a, i) {
+                    for q in parts_of(tree_b, j) {
+                        let truth = measured[p][q];
+                        let label = format!("seed {seed}, parts {p} and {q} in nodes {i} and {j}: {truth:?}");
+                        assert!(
+                            gap <= truth.0 && level <= truth.1 && growth <= truth.2,
+                            "{label}, {gap} {level} {growth}"
+                        );
+                    }
+                }
+                let is_inner = parts_of(tree_a, i).len() > 1 && parts_of(tree_b, j).len() > 1;
+                useful[0] += u32::from(is_inner && level > 1.0);
+                useful[1] += u32::from(is_inner && growth > 1.0);
+            }
+        }
+    }
+    assert!(useful.iter().all(|&count| count > 20), "{useful:?}");
+}
+
+/// The parts below a node.
+fn parts_of(tree: &PartTree, node: usize) -> Vec<usize> {
+    match tree.nodes()[node].content {
+        NodeContent::Part(part) => vec![part.into()],
+        NodeContent::Nodes(nodes) => nodes.into_iter().flat_map(|node| parts_of(tree, node.into())).collect(),
+    }
+}
+
+/// As many elongated parts, so small that about as much of the space is filled by any number of
+/// them.
+fn cloud(random: &mut Seeded, count: usize) -> Compound {
+    let size = (count as f64).cbrt().recip();
+    let mut part = || {
+        let egg = Body::ellipsoid("part", Vector3::zeros(), Vector3::new(0.9, 0.35, 0.3) * size).unwrap();
+        let turn = UnitQuaternion::from_scaled_axis(random.unit() * 3.0);
+        egg.moved(&turn, &Vector3::from_fn(|_, _| random.signed())).unwrap()
+    };
+    Compound::new("cloud", (0..count).map(|_| part()).collect()).unwrap()
+}
+
+/// Of solids with many parts every measure evaluates bounds of few nodes and solves few pairs: both
+/// grow far less than the number of pairs.
+#[test]
+fn few_of_many_parts_are_touched() {
+    type Ask = fn(&Compound, &Compound, &Pose, &mut WarmStart);
+    const OPTIONS: fn() -> Options<'static> = Options::default;
+    let measures: [(&str, usize, Ask); 8] = [
+        ("distance", 2, |a, b, pose, warm| {
+            distance(a, &Pose::identity(), b, pose, &OPTIONS(), warm);
+        }),
+        ("overlap", 2, |a, b, pose, warm| {
+            overlap(a, &Pose::identity(), b, pose, &OPTIONS(), warm);
+        }),
+        ("signed distance", 2, |a, b, pose, warm| {
+            signed_distance(a, &Pose::identity(), b, pose, &OPTIONS(), warm);
+        }),
+        ("level distance", 2, |a, b, pose, warm| {
+            level_distance(a, &Pose::identity(), b, pose, &OPTIONS(), warm);
+        }),
+        ("growth distance", 2, |a, b, pose, warm| {
+            growth_distance(a, &Pose::identity(), b, pose, &OPTIONS(), warm);
+        }),
+        ("capsule", 1, |a, _, pose, warm| {
+            distance_to_capsule(a, &Pose::identity(), &Capsule::new(0.1, 0.6).unwrap(), pose, &OPTIONS(), warm);
+        }),
+        ("overlap with a capsule", 1, |a, _, pose, warm| {
+            overlap_with_capsule(a, &Pose::identity(), &Capsule::new(0.1, 0.6).unwrap(), pose, &OPTIONS(), warm);
+        }),
+        ("point", 1, |a, _, pose, warm| {
+            distance_to_point(a, &Pose::identity(), pose.translation(), &OPTIONS(), warm).unwrap();
+        }),
+    ];
+    for (name, sides, ask) in measures {
+        for count in [8, 64, 256] {
+            let (mut cold, mut warmed) = ([0; 2], [0; 2]);
+            let queries = 12_u32;
+            for seed in 0..queries {
+                let mut random = Seeded(17_000 + u64::from(seed));
+                let (a, b) = (cloud(&mut random, count), cloud(&mut random, count));
+                let pose =
+                    random_pose(&mut random, 0.0).with_translation(random.unit() * (3.2 + 0.6 * random.signed()));
+                let mut warm = WarmStart::default();
+                for total in [&mut cold, &mut warmed] {
+                    let ((), touched) = touched(|| ask(&a, &b, &pose, &mut warm));
+                    (0..2).for_each(|k| total[k] += touched[k]);
+                }
+            }
+            let pairs = if sides == 2 { count * count } else { count };
+            let each = |total: [u32; 2]| total.map(|total| f64::from(total) / f64::from(queries));
+            let ([bounds, solved], again) = (each(cold), each(warmed));
+            println!("{name}, {pairs} pairs: {bounds:.0} bounds and {solved:.1} solved, {again:.1?} with a hint");
+            if count == 256 {
+                assert!(bounds < pairs as f64 / 4.0 && solved < 40.0, "{name}: {bounds} bounds, {solved} solved");
+            }
+        }
+    }
 }
 
 /// Length of a separating translation along n, from samples.
