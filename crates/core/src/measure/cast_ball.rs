@@ -6,11 +6,12 @@
 //! touch is found like the entry of a ray, from projections of the centre.
 
 use crate::body::{Body, Solid};
-use crate::measure::cast_ray::{Ray, RayCast, RayError, RayHit, first_hit};
+use crate::measure::cast_ray::{Ray, RayCast, RayError, RayHit, ShapeEntry, enter, first_hit};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::point::Projection;
 use crate::measure::solver::convex_root_bracket::Entry;
+use crate::measure::solver::exact_shape::{PointOffset, PointSide, offset_of_point};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
@@ -62,6 +63,9 @@ const MAX_STEPS: u32 = 64;
 
 fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Options<'_>) -> RayCast {
     let Sweep { ray, radius } = sweep;
+    if let Some(found) = at_shape(body, pose, sweep, tolerance, options) {
+        return found;
+    }
     let (base, mut entry) = match within_ball(body, pose, sweep) {
         Some(found) => found,
         None => return RayCast::Miss,
@@ -127,6 +131,29 @@ fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Op
         normal: found.normal.try_normalize(0.0).filter(|_| found.upper > 0.0),
         iterations,
     })
+}
+
+/// The cast at a ball or a box by its closed form; none at others, and where it is not as accurate
+/// as asked for.
+fn at_shape(
+    body: &Body,
+    pose: &Pose,
+    Sweep { ray, radius }: &Sweep,
+    tolerance: f64,
+    options: &Options<'_>,
+) -> Option<RayCast> {
+    let form = body.closed_form().filter(|_| runs(Stage::ClosedForm))?;
+    let (lower, upper) = match enter((form, pose), (ray, *radius), tolerance, options)? {
+        ShapeEntry::Miss => return Some(RayCast::Miss),
+        ShapeEntry::Hit { lower, upper, .. } => (lower, upper),
+    };
+    let center = ray.point(upper);
+    let (point, normal) = match offset_of_point((form, pose), &center) {
+        PointSide::Outside(PointOffset { witness, normal, .. }) => (witness, Some(normal)),
+        PointSide::Inside => (center, None),
+        PointSide::Open => return None,
+    };
+    Some(RayCast::Hit(RayHit { status: Status::Converged, lower, upper, point, normal, iterations: 0 }))
 }
 
 /// The parameter of the ray closest to the centre of the circumscribed ball, and the interval about

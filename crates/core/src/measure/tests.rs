@@ -4,6 +4,7 @@
 //! types than those of unit tests: helpers that make any are here, all else is in the testkit.
 
 mod ablation;
+mod closed_forms;
 mod compounds;
 pub(super) mod edges;
 mod exact_shapes;

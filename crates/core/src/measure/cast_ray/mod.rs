@@ -5,9 +5,12 @@
 //! parameter, and an interpolation of its values, which proves nothing, the first. All in the
 //! normalized coordinates of the body, into which the ray is taken once: `z(τ) = z_0 + τ ż`, τ
 //! measured from the point closest to the centre of the circumscribed ball, so that a far origin
-//! costs one rounding of its own size and no more.
+//! costs one rounding of its own size and no more. Boxes, cylinders and balls are entered where
+//! their closed forms say (`closed_form.rs`), but where the ray grazes them.
 
 mod answer;
+mod approach;
+mod closed_form;
 mod normalized_ray;
 mod ray;
 #[cfg(test)]
@@ -19,6 +22,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 pub use answer::{RayCast, RayHit};
+pub(super) use closed_form::{ShapeEntry, enter};
 use nalgebra::Vector3;
 use normalized_ray::NormalizedRay;
 pub use ray::{Ray, RayError};
@@ -95,6 +99,18 @@ const MAX_STEPS: u32 = 96;
 
 /// The first point of one body on a ray, bracketed within a tolerance in metres.
 fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Options<'_>) -> RayCast {
+    if runs(Stage::ClosedForm)
+        && let Some(form) = body.closed_form()
+        && let Some(found) = enter((form, pose), (ray, 0.0), tolerance, options)
+    {
+        return match found {
+            ShapeEntry::Miss => RayCast::Miss,
+            ShapeEntry::Hit { lower, upper, normal } => {
+                let (status, point) = (Status::Converged, ray.point(upper));
+                RayCast::Hit(RayHit { status, lower, upper, point, normal, iterations: 0 })
+            }
+        };
+    }
     let Some((along, mut entry)) = NormalizedRay::new(body, pose, ray) else { return RayCast::Miss };
     // A little beyond a root being inside is provable, and the tangent is as good.
     let beyond = 0.25 * tolerance;

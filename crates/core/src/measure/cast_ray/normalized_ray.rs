@@ -1,12 +1,13 @@
 //! A ray in the normalized coordinates of a body, and what an evaluation on it proves.
 
+use super::approach::Approach;
 use super::ray::Ray;
 use crate::body::{Body, MAX_CONSTRAINTS};
-use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
+use crate::measure::frames::pose::Pose;
 use crate::measure::solver::convex_root_bracket::Entry;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::polynomial::{Polynomial, gamma};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 /// A ray in the normalized coordinates of a body: `z(τ) = z_0 + τ ż`.
 pub(super) struct NormalizedRay<'a> {
@@ -36,25 +37,11 @@ impl<'a> NormalizedRay<'a> {
     /// The ray and the interval of τ where it is in the circumscribed ball and within the bounds of
     /// the normalized coordinates; none if there is no such τ.
     pub(super) fn new(body: &'a Body, pose: &Pose, ray: &Ray) -> Option<(Self, Entry)> {
-        let turn: Matrix3<f64> = pose.rotation().to_rotation_matrix().into_inner();
-        let offset = ray.origin - pose.translation();
-        let ball = body.circumscribed();
-        let direction = turn.tr_mul(&ray.direction);
-        let from_ball = turn.tr_mul(&offset) - ball.center;
-        let base = -from_ball.dot(&direction);
-        let closest = from_ball + direction * base;
-        // All that is rounded before normalization moves a point of the ray by at most this much.
-        let center = body.normalization().center;
-        let far = offset.norm() + base.abs() + 2.0 * ball.radius;
-        let relative = ROTATION_ERROR + gamma(16);
-        let moved = relative * far + gamma(8) * (ball.center.norm() + center.norm());
+        let (ball, center) = (body.circumscribed(), body.normalization().center);
+        let Approach { base, closest, direction, errors: (moved, relative), mut entry } =
+            Approach::within(ball.radius, &ball.center, pose, ray)?;
+        let moved = moved + gamma(8) * center.norm();
         let reach = ball.radius * (1.0 + 1e-14) + moved;
-        let half = reach * reach - closest.norm_squared();
-        if half < 0.0 {
-            return None;
-        }
-        let half = half.sqrt() * (1.0 + 1e-14) + moved;
-        let mut entry = Entry::between((-half).max(-base), half.min(ray.max_length - base));
 
         let linear = &body.normalization().linear;
         let from_center = closest + (ball.center - center);

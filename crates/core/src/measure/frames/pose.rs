@@ -172,6 +172,11 @@ impl Pose {
         self.rotation * point + self.translation
     }
 
+    /// The point of the body frame at a world position.
+    pub(in crate::measure) fn inverse_transform_point(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.rotation.inverse_transform_vector(&(point - self.translation))
+    }
+
     /// World direction of a direction of the body frame.
     pub fn transform_direction(&self, direction: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * direction

@@ -22,6 +22,7 @@
 //! the left by duality, the right because a gauge is subadditive.
 
 mod answer;
+mod closed_form;
 mod minkowski_portal;
 mod pair;
 mod problem;

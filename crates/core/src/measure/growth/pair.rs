@@ -1,6 +1,7 @@
 //! Growth distance of two bodies: continuation first, then a search about their common centre.
 
 use super::answer::GrowthDistance;
+use super::closed_form::of_shapes;
 use super::minkowski_portal::crossing;
 use super::problem::{Along, tolerance};
 use crate::body::Body;
@@ -30,6 +31,11 @@ pub(super) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
+    if runs(Stage::ClosedForm)
+        && let Some(found) = of_shapes((a, pose_a), (b, pose_b), options, warm)
+    {
+        return found;
+    }
     let along = Along::new(a, pose_a, b, pose_b, options.accuracy());
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint

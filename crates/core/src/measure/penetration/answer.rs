@@ -25,7 +25,7 @@ pub struct Penetration {
     /// the direction is not known to be the best of those near it: direction and witnesses may then
     /// jump.
     pub tied: bool,
-    /// Directions whose support points were computed.
+    /// Directions whose support points were computed; 0 where a closed form answers.
     pub directions: u32,
     /// Iterations: sweeps over triangles, and steps of Newton's method.
     pub iterations: u32,

@@ -1,6 +1,7 @@
 //! Penetration depth: the shortest translation that takes two overlapping solids apart.
 
 mod answer;
+mod closed_form;
 mod pair;
 #[cfg(test)]
 mod tests;

@@ -1,12 +1,14 @@
 //! Penetration depth of two bodies.
 
 use super::answer::Penetration;
+use super::closed_form::of_shapes;
 use crate::body::Body;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::depth::local_search::{Best, tolerance};
 use crate::measure::solver::depth::sweep::prove;
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 
@@ -17,6 +19,11 @@ pub(super) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Penetration {
+    if runs(Stage::ClosedForm)
+        && let Some(found) = of_shapes((a, pose_a), (b, pose_b), options, warm)
+    {
+        return found;
+    }
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut best = Best::new(&pair, pose_a, pose_b, options);
     best.follow(&warm.hint);

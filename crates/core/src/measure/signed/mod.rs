@@ -5,10 +5,13 @@
 //! `-h_A(-n) - h_B(n)`, how far a plane across n parts the bodies. Its optimality system is that of
 //! the distance with a distance of either sign, so Newton's method passes through contact without
 //! noticing; x and y trade places along n. What differs is the proof: apart, any pair of points
-//! bounds it from above; in overlap that takes all directions ([`crate::measure::penetration`]).
+//! bounds it from above; in overlap that takes all directions ([`crate::measure::penetration`]). Of
+//! balls beside balls, boxes and cylinders, and of boxes, it has a closed form.
 
 mod answer;
+mod closed_form;
 mod pair;
+mod report;
 pub(super) mod separating_translation;
 #[cfg(test)]
 mod tests;

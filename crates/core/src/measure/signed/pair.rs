@@ -1,15 +1,15 @@
 //! Signed distance of two bodies.
 
 use super::answer::SignedDistance;
+use super::closed_form::of_shapes;
+use super::report::Answer;
 use crate::body::Body;
 use crate::measure::bounds::duality_bounds::distance_upper;
 use crate::measure::distance::distance;
-use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
-use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
-use crate::measure::solver::continuation::{Follow, Proven};
+use crate::measure::solver::continuation::Follow;
 use crate::measure::solver::depth::local_search::{Best, tolerance};
 use crate::measure::solver::depth::sweep::prove;
 use crate::measure::solver::stages::{Stage, runs};
@@ -26,6 +26,11 @@ pub(super) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> SignedDistance {
+    if runs(Stage::ClosedForm)
+        && let Some(found) = of_shapes((a, pose_a), (b, pose_b), options, warm)
+    {
+        return found;
+    }
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint
@@ -140,38 +145,5 @@ impl Known {
     fn narrow(&self, best: &Best<'_>) -> bool {
         let depth = if self.upper < 0.0 { -self.lower } else { 0.0 };
         self.upper - self.lower <= tolerance(best.pair, best.options, depth)
-    }
-}
-
-struct Answer {
-    lower: f64,
-    upper: f64,
-    tied: bool,
-    iterations: u32,
-    status: Status,
-}
-
-impl Answer {
-    fn of(proven: &Proven) -> Self {
-        let Proven { lower, upper, rounds, .. } = *proven;
-        Self { lower, upper, tied: false, iterations: rounds, status: Status::Converged }
-    }
-
-    fn report(
-        self,
-        (witness_a, witness_b): (Vector3<f64>, Vector3<f64>),
-        normal: Option<Vector3<f64>>,
-        pose_a: &Pose,
-        pose_b: &Pose,
-    ) -> SignedDistance {
-        let Self { lower, upper, tied, iterations, status } = self;
-        let gradients = normal.map(|n| {
-            [
-                Twist::of_gradient(n, &witness_a, pose_a.translation()),
-                Twist::of_gradient(-n, &witness_b, pose_b.translation()),
-            ]
-        });
-        let at_contact = lower <= 0.0 && upper >= 0.0;
-        SignedDistance { status, lower, upper, witness_a, witness_b, normal, gradients, at_contact, tied, iterations }
     }
 }

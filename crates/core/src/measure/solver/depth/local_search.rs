@@ -1,5 +1,6 @@
 //! The shortest known translation that takes overlapping bodies apart.
 
+use crate::body::Body;
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, DualTrial, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
@@ -86,6 +87,11 @@ const MOST_ROUNDS: u32 = 24;
 /// Width of a bracket asked for, in query units.
 pub(in crate::measure) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, depth: f64) -> f64 {
     (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
+}
+
+/// The same in metres.
+pub(in crate::measure) fn shape_tolerance(a: &Body, b: &Body, options: &Options<'_>, depth: f64) -> f64 {
+    (options.depth_accuracy() * depth).max(options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius))
 }
 
 /// Rigorous upper bound of f(n), the depth along n, from multipliers for -n of A and for n of B as
@@ -361,7 +367,7 @@ impl<'a> Best<'a> {
 ///
 /// Closer to 1, neighbours of the best are reported as ties; smaller, mirror images of slim bodies
 /// are missed. Exercised by `ties_are_flagged_and_limits_admitted`.
-pub(super) const ELSEWHERE: f64 = 0.99;
+pub(in crate::measure) const ELSEWHERE: f64 = 0.99;
 
 #[cfg(test)]
 mod tests {

@@ -2,11 +2,15 @@
 //! a radius of one. One smooth body is left to linearize; the other side costs no evaluation.
 
 mod along_body;
+mod beside;
 mod cuboid;
+mod cuboid_axes;
 mod cylinder;
 mod distance;
+mod growth;
 mod lanes;
 mod level;
+mod line;
 mod minimum;
 mod newton;
 mod placed;
@@ -16,6 +20,7 @@ mod segment;
 mod separating_plane;
 mod shape_pair;
 mod shapes;
+mod signed;
 mod start;
 
 pub(in crate::measure) use cuboid::Cuboid;
@@ -23,7 +28,9 @@ pub(in crate::measure) use cylinder::Cylinder;
 pub(in crate::measure) use distance::{
     ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED, common,
 };
+pub(in crate::measure) use growth::growth_of_shapes;
 pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start};
+pub(in crate::measure) use line::{Line, Target};
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
 pub(in crate::measure) use placed::{
     ExactContact, ExactQuery, active, direction_to_world, normals_towards, seen_from, to_world,
@@ -33,4 +40,5 @@ pub(in crate::measure) use projectable::{Offset, Projectable};
 pub(in crate::measure) use segment::Segment;
 pub(in crate::measure) use separating_plane::{SeparatingPlane, separating_plane};
 pub(in crate::measure) use shapes::{ShapeContact, ShapeDistance, between_shapes, contact_of_shapes};
+pub(in crate::measure) use signed::{SignedShapes, signed_of_shapes};
 pub(in crate::measure) use start::start as cold_start;

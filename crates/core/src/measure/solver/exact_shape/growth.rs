@@ -1,0 +1,160 @@
+//! The growth distance of two shapes about their centres: of balls beside balls and boxes, and of
+//! boxes.
+//!
+//! Shapes are symmetric about their centres, so that their difference with the centres on each
+//! other, which is what s is the gauge of, is their sum. That of a ball and a box is a rounded box,
+//! which the ray through the vector between the centres leaves at the root of a quadratic; that of
+//! two boxes is a polytope, whose gauge is the largest over the axes across its faces.
+
+use super::beside::beside;
+use super::cuboid_axes::CuboidAxis;
+use super::line::{Line, Target};
+use super::placed::direction_to_world;
+use super::shapes::{Placed, between_shapes};
+use super::signed::{ALIGNED, cuboid_axes};
+use crate::measure::bounds::culling::across;
+use crate::measure::frames::pose::RELATIVE_ERROR;
+use crate::measure::options::Options;
+use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::polynomial::gamma;
+use nalgebra::Vector3;
+
+/// A proven bracket of the growth distance of two shapes, and where it is attained; world frame.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct GrowthOfShapes {
+    pub(in crate::measure) lower: f64,
+    pub(in crate::measure) upper: f64,
+    /// A point of both shapes grown by the upper bound, metres.
+    pub(in crate::measure) witness: Vector3<f64>,
+    /// The point of A that grows there; world frame, metres.
+    pub(in crate::measure) of_a: Vector3<f64>,
+    /// Unit vector from B to A.
+    pub(in crate::measure) normal: Vector3<f64>,
+    /// Half of what both shapes cover along it, together, metres: the inverse of the slope.
+    pub(in crate::measure) width: f64,
+    pub(in crate::measure) steps: u32,
+}
+
+/// The growth distance about the centres, given radii of balls about these in the shapes, metres,
+/// and from a point of A on, world frame; none of other shapes, and where centres or edges are too
+/// near for a normal.
+pub(in crate::measure) fn growth_of_shapes(
+    of_a: Placed<'_>,
+    of_b: Placed<'_>,
+    radii: [f64; 2],
+    start: Option<&Vector3<f64>>,
+    options: &Options<'_>,
+) -> Option<GrowthOfShapes> {
+    if options.exhausted(0) {
+        return None;
+    }
+    if let Some(radius) = of_a.0.shape().ball_radius_m() {
+        return with_ball((of_a, radius), of_b, radii).map(|(found, _)| found);
+    }
+    if let Some(radius) = of_b.0.shape().ball_radius_m() {
+        let (found, of_other) = with_ball((of_b, radius), of_a, radii)?;
+        return Some(GrowthOfShapes { of_a: of_other, normal: -found.normal, ..found });
+    }
+    of_cuboids(of_a, of_b, radii, start, options)
+}
+
+/// Of a ball A, with the point of B that grows to the witness.
+fn with_ball(
+    ((ball, pose), radius): (Placed<'_>, f64),
+    of_b: Placed<'_>,
+    [radius_a, radius_b]: [f64; 2],
+) -> Option<(GrowthOfShapes, Vector3<f64>)> {
+    let (form_b, pose_b) = of_b;
+    let target = Target::within(radius, form_b.shape())?;
+    let (vector, apart, error) = across((pose, ball.center()), (pose_b, form_b.center()));
+    if !(apart * ALIGNED > error) {
+        return None;
+    }
+    let own = pose_b.rotation().inverse_transform_vector(&vector);
+    let u = form_b.axes().map_or(own, |axes| axes.tr_mul(&own)) / apart;
+    let reach = target.reach();
+    let turned = 3.0 * (RELATIVE_ERROR + gamma(8));
+    let off = target.rounding(0.0) + turned * reach + ball.displacement_m() + form_b.displacement_m();
+    // The way out is the way in, seen from behind.
+    let behind = Line { start: Vector3::zeros(), velocity: -u };
+    let leaves = |larger: f64| target.first(&behind, larger, (-2.0 * reach, 0.0)).map(|s| -s);
+    let (farthest, nearest) = (leaves(off)?, leaves(-off)?);
+    if !(nearest > 0.0) {
+        return None;
+    }
+    let error = error / (radius_a + radius_b);
+    let lower = apart / farthest * (1.0 - gamma(8)) - error;
+    let upper = (apart / nearest + error) * (1.0 + gamma(8));
+    let seen = beside(form_b.shape(), (u * nearest).into(), 1.0);
+    if off + nearest * turned > ALIGNED * seen.arm {
+        return None;
+    }
+    let n = Vector3::from(seen.n);
+    let normal = direction_to_world(form_b, pose_b, seen.n);
+    let (center, center_b) = (pose.transform_point(ball.center()), pose_b.transform_point(form_b.center()));
+    let witness = center - normal * (radius * upper);
+    let found = GrowthOfShapes {
+        lower: lower.max(0.0),
+        upper,
+        witness,
+        of_a: center - normal * radius,
+        normal,
+        width: n.dot(&u) * nearest,
+        steps: 0,
+    };
+    Some((found, center_b + (witness - center_b) / upper))
+}
+
+fn of_cuboids(
+    of_a: Placed<'_>,
+    of_b: Placed<'_>,
+    [radius_a, radius_b]: [f64; 2],
+    start: Option<&Vector3<f64>>,
+    options: &Options<'_>,
+) -> Option<GrowthOfShapes> {
+    let ((form_a, pose_a), (form_b, pose_b)) = (of_a, of_b);
+    let axes = cuboid_axes(of_a, of_b)?;
+    let ratio = |axis: &CuboidAxis| axis.apart.abs() / axis.width;
+    let best = axes.all().into_iter().filter(CuboidAxis::is_accurate);
+    let best = best.max_by(|p, q| ratio(p).total_cmp(&ratio(q)))?;
+    let (vector, distance, vector_error) = across((pose_a, form_a.center()), (pose_b, form_b.center()));
+    if !(distance * ALIGNED > vector_error && best.apart != 0.0) {
+        return None;
+    }
+    let n = best.n / (best.length * 1_f64.copysign(best.apart));
+    let normal = direction_to_world(form_b, pose_b, n.into());
+    // Where the boxes touch as they are turned, B about the origin; from there apart by any gap.
+    let gap = form_a.reach_m().min(form_b.reach_m());
+    let center = vector / ratio(&best) + normal * gap;
+    let arms = [(form_a, pose_a), (form_b, pose_b)].map(|(form, pose)| pose.transform_direction(form.center()));
+    let moved = (pose_a.with_translation(center - arms[0]), pose_b.with_translation(-arms[1]));
+    let start = start.map(|start| start - pose_a.translation() + moved.0.translation());
+    let goal = (ALIGNED * gap, options);
+    let found =
+        between_shapes((form_a, &moved.0), (form_b, &moved.1), start.as_ref(), &StopCriterion::NARROW, goal).ok()?;
+    if (found.normal - normal).norm() > ALIGNED {
+        return None;
+    }
+    let error = axes.error();
+    let lower = (best.apart.abs() - error) / (best.width + error) * (1.0 - gamma(8));
+    // As of any two points: t + |Δ - t w| / R.
+    let (x, y) = (found.witness_a - center, found.witness_b);
+    let w = y - x;
+    let t = distance * distance / w.dot(&vector);
+    let rest = vector - w * t;
+    let missing = rest.norm() + vector_error + t * 4.0 * error;
+    let upper = (t + missing / (radius_a + radius_b)) * (1.0 + gamma(16));
+    if !(t > 0.0) {
+        return None;
+    }
+    let from = pose_a.transform_point(form_a.center());
+    Some(GrowthOfShapes {
+        lower: lower.max(0.0),
+        upper,
+        witness: from + x * t - rest * (radius_a / (radius_a + radius_b)),
+        of_a: from + x,
+        normal,
+        width: best.width,
+        steps: found.steps,
+    })
+}
