@@ -127,8 +127,9 @@ impl Shown {
 
     /// The stages that never came to their turn, as a sentence.
     fn idle(&self) -> String {
-        let queries = |title: &str| self.lines.iter().filter(|line| line.title == title).map(|line| line.queries).sum();
-        let idle = TITLES.iter().filter(|(_, title)| queries(title) == 0_u64).map(|(_, title)| (*title).to_owned());
+        let queries =
+            |title: &str| self.lines.iter().filter(|line| line.title == title).map(|line| line.queries).sum::<u64>();
+        let idle = TITLES.iter().filter(|(_, title)| queries(title) == 0).map(|(_, title)| (*title).to_owned());
         format!("Stages that never came to their turn: {}.\n", listed(idle))
     }
 }
