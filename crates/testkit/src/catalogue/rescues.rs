@@ -4,7 +4,7 @@
 //! They were drawn by the endurance bench. Here they are by their poses, since a draw depends on the
 //! list of bodies and, near contact, on the last digits of other answers.
 
-use crate::bodies::{b, cylinder, q};
+use crate::bodies::{b, cut, cylinder, q};
 use sublevel_core::body::Body;
 
 /// What is asked of the pair.
@@ -40,11 +40,12 @@ const ORIGIN: Place = ([0.0; 3], [0.0, 0.0, 0.0, 1.0]);
 
 /// All of them.
 pub fn all() -> Vec<Rescue> {
-    tilted_sides().into_iter().collect()
+    tilted_sides().into_iter().chain(tilted_flats()).collect()
 }
 
-/// Thin and small boxes over sides tilted by 1e-9 to 1e-5, which stayed wide: 28abc53, 60fda9a,
-/// 86c5622 and a91e8ca.
+/// Thin and small boxes over sides tilted by 1e-9 to 1e-5, which stayed wide: 28abc53, 60fda9a (block
+/// 3319 query 2504 of seed 21, the first), 86c5622 (the plate and the can) and a91e8ca (block 1087
+/// query 3129, the second, and the needle).
 fn tilted_sides() -> [Rescue; 6] {
     let (small, plate) = (b(0.02, 0.03, 0.01), b(1.0, 1.0, 1e-3));
     let (can, needle) = (cylinder(0.5, 0.8), q(8, 0.05, 0.05, 1.0));
@@ -96,6 +97,38 @@ fn tilted_sides() -> [Rescue; 6] {
                 [0.0, 0.0, 1.0399134566614892],
                 [-2.284816999302442e-10, 7.212971117697647e-10, -2.773868358421155e-11, 1.0],
             ),
+        ),
+    ]
+}
+
+/// Needles of degree 8 across a face that a slab cuts, tilted by some 1e-9: blocks 5653 and 8298 of
+/// seed 1. Their growth distances stay up to twice as wide as asked for, and say so.
+fn tilted_flats() -> [Rescue; 2] {
+    let case = |what: &str, place: Place, widest: f64| Rescue {
+        ask: Ask::Growth,
+        a: q(8, 0.05, 0.05, 1.0),
+        b: cut(0.6, 0.9, 0.3),
+        at: [ORIGIN, place],
+        before: None,
+        widest: Some(widest),
+        what: format!("tilted flats, {what}"),
+    };
+    [
+        case(
+            "seed 1 block 5653 query 2919",
+            (
+                [-2.766991330468682, 0.0, 0.0],
+                [1.1207363733145547e-9, -1.5291567182831711e-9, -3.41385737158504e-9, 1.0],
+            ),
+            8e-9,
+        ),
+        case(
+            "seed 1 block 8298 query 2422",
+            (
+                [-3.473327188250241, 0.0, 0.0],
+                [1.7923201592573305e-9, -1.605170366214535e-9, 3.0277239278894357e-9, 1.0],
+            ),
+            1e-8,
         ),
     ]
 }
