@@ -36,17 +36,35 @@ const MIDDLE: Vector3<f64> = Vector3::new(0.0, 0.0, 0.9);
 /// A counted solve: what it returns is whether it converged, and its iterations.
 type Solve = fn(&Bodies, &Pose, &mut WarmStart) -> (Status, u32);
 
+/// Where the bodies of a row stand.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Where {
+    /// Apart, all of them.
+    Apart,
+    /// The chair and the human, moved along the normal to a centimetre from contact or less, on
+    /// either side by turns.
+    NearHuman,
+    /// The chair and the box, likewise.
+    NearBox,
+}
+
+use Where::{Apart, NearBox, NearHuman};
+
 /// The rows; those that are not warm forget the pose before.
-const ROWS: [(&str, bool, Solve); 9] = [
-    ("distance_warm", true, solve_distance),
-    ("distance_cold", false, solve_distance),
-    ("level_distance_warm", true, solve_level_distance),
-    ("level_distance_cold", false, solve_level_distance),
-    ("box_warm", true, solve_box),
-    ("box_cold", false, solve_box),
-    ("two_boxes_cold", false, solve_boxes),
-    ("capsule_warm", true, solve_capsule),
-    ("overlap_apart", false, decide_overlap),
+const ROWS: [(&str, bool, Where, Solve); 13] = [
+    ("distance_warm", true, Apart, solve_distance),
+    ("distance_cold", false, Apart, solve_distance),
+    ("distance_near", false, NearHuman, solve_distance),
+    ("level_distance_warm", true, Apart, solve_level_distance),
+    ("level_distance_cold", false, Apart, solve_level_distance),
+    ("box_warm", true, Apart, solve_box),
+    ("box_cold", false, Apart, solve_box),
+    ("box_near", false, NearBox, solve_box),
+    ("two_boxes_cold", false, Apart, solve_boxes),
+    ("capsule_warm", true, Apart, solve_capsule),
+    ("overlap_apart", false, Apart, decide_overlap),
+    ("overlap_near", false, NearHuman, decide_overlap),
+    ("overlap_box_near", false, NearBox, decide_overlap_of_box),
 ];
 
 /// Count the instructions of solves and compare them with the recorded counts
@@ -179,7 +197,7 @@ fn count(row: &str) -> Result<Count, Box<dyn Error>> {
 
 /// Runs the solves of a row and prints the sum of their iterations.
 fn run(row: &str) -> Result<(), Box<dyn Error>> {
-    let (_, warm, solve) = ROWS.into_iter().find(|(known, ..)| *known == row).ok_or("--run: no such row")?;
+    let (_, warm, place, solve) = ROWS.into_iter().find(|(known, ..)| *known == row).ok_or("--run: no such row")?;
     let load = |name: &str| -> Result<Body, Box<dyn Error>> { Ok(Body::from_json(&read(&body_file(name))?)?) };
     let capsule = Capsule::new(0.25, 0.65)?;
     let boxes = [
@@ -187,13 +205,25 @@ fn run(row: &str) -> Result<(), Box<dyn Error>> {
         Body::cuboid("crate", Vector3::new(0.4, 0.4, 0.5))?,
     ];
     let bodies = Bodies { chair: load("chair")?, human: load("human")?, boxes, capsule };
-    let poses = poses()?;
+    let mut poses = poses()?;
+    let other = if place == NearBox { &bodies.boxes[0] } else { &bodies.human };
     // Once uncounted, to see that each is what it is meant to be: bodies apart, and converged.
-    for pose in &poses {
-        let options = Options::default();
-        let gap = distance(&bodies.chair, &Pose::identity(), &bodies.human, pose, &options, &mut WarmStart::default());
-        if !(gap.lower > 0.0) || solve(&bodies, pose, &mut WarmStart::default()).0 != Status::Converged {
-            return Err(format!("{row}: not apart or not converged at {pose:?}").into());
+    for (k, pose) in poses.iter_mut().enumerate() {
+        let to = |pose: &Pose| {
+            let (options, mut warm) = (Options::default(), WarmStart::default());
+            distance(&bodies.chair, &Pose::identity(), other, pose, &options, &mut warm)
+        };
+        let gap = to(pose);
+        let apart = gap.normal.filter(|_| gap.lower > 0.0).ok_or_else(|| format!("{row}: not apart at {pose:?}"))?;
+        if place != Apart {
+            let (sign, wanted) = (if k % 2 == 0 { 1.0 } else { -1.0 }, 1e-4 * (1.0 + (k % 100) as f64));
+            *pose = pose.with_translation(pose.translation() + apart * (gap.upper - sign * wanted));
+            if (to(pose).lower > 0.0) != (sign > 0.0) {
+                return Err(format!("{row}: on the other side of contact at {pose:?}").into());
+            }
+        }
+        if solve(&bodies, pose, &mut WarmStart::default()).0 != Status::Converged {
+            return Err(format!("{row}: not converged at {pose:?}").into());
         }
     }
     println!("{}", counted(&bodies, &poses, warm, solve));
@@ -243,8 +273,15 @@ fn solve_capsule(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status,
 }
 
 fn decide_overlap(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
-    let answer = overlap(&bodies.chair, &Pose::identity(), &bodies.human, pose, &Options::default(), warm);
-    (if answer == Decision::No { Status::Converged } else { Status::BracketWide }, 0)
+    decided(overlap(&bodies.chair, &Pose::identity(), &bodies.human, pose, &Options::default(), warm))
+}
+
+fn decide_overlap_of_box(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    decided(overlap(&bodies.chair, &Pose::identity(), &bodies.boxes[0], pose, &Options::default(), warm))
+}
+
+fn decided(answer: Decision) -> (Status, u32) {
+    (if matches!(answer, Decision::Undecided { .. }) { Status::BracketWide } else { Status::Converged }, 0)
 }
 
 /// The human about the chair: round it at a varying distance, a centimetre a step, turning by a

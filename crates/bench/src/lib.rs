@@ -1,6 +1,7 @@
 //! Measurements of Sublevel beside other libraries and solvers, as reports with pictures and raw
 //! numbers; and what its benches share. Not published: users of Sublevel compile none of it.
 
+pub mod ablation;
 pub mod accuracy;
 mod baselines;
 mod blocks;

@@ -5,13 +5,14 @@ use crate::blocks::refreshed;
 use crate::csv::CsvError;
 use crate::measures;
 use crate::table1::Table1;
-use crate::{accuracy, cost, detail, fits, pairs, panda, scenes, sets, speed, warm};
+use crate::{ablation, accuracy, cost, detail, fits, pairs, panda, scenes, sets, speed, warm};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use sublevel::cli;
 
 /// A CSV as pages show it.
 enum Shown {
+    Ablation(ablation::Shown),
     Speed(speed::Shown),
     Warm(warm::Shown),
     Accuracy(accuracy::Shown),
@@ -33,6 +34,7 @@ impl Shown {
         let text = cli::read(&path).map_err(|error| error.to_string())?;
         let at = |error: CsvError| format!("{}: {error}", path.display());
         match name {
+            "ablation.csv" => ablation::Shown::read(&text).map(Self::Ablation),
             "speed.csv" => speed::Shown::read(&text).map(Self::Speed),
             "warm.csv" => warm::Shown::read(&text).map(Self::Warm),
             "accuracy.csv" => accuracy::Shown::read(&text).map(Self::Accuracy),
@@ -56,6 +58,7 @@ impl Shown {
 
     fn block(&self, name: &str) -> Option<String> {
         match self {
+            Self::Ablation(shown) => shown.block(name),
             Self::Speed(shown) => shown.block(name),
             Self::Warm(shown) => shown.block(name),
             Self::Accuracy(shown) => shown.block(name),
@@ -122,7 +125,7 @@ pub(crate) fn pictures(csv: &str, folder: &Path) -> Result<Vec<(String, String)>
         Shown::Sets(shown) => shown.pictures(),
         Shown::Detail(shown) => shown.pictures(),
         Shown::Parts(shown) => shown.pictures(),
-        Shown::Table1(_) | Shown::Measures(_) => Ok(Vec::new()),
+        Shown::Ablation(_) | Shown::Table1(_) | Shown::Measures(_) => Ok(Vec::new()),
     };
     drawn.map_err(|error| format!("{csv}: {error}"))
 }

@@ -3,6 +3,7 @@
 use crate::draw::{Draw, Style};
 use crate::measures::{Answer, MEASURES};
 use crate::tally::{Check, Iterations, Tally, Worst};
+use crate::verdict::Verdict;
 use sublevel::body::Body;
 use sublevel::measure::{
     Decision, Distance, MAX_ITERATIONS, Options, Pose, WarmStart, distance_batch, nearer_than, overlap,
@@ -41,8 +42,9 @@ pub(crate) fn run(bodies: &[Body], seed: u64, block: u64, program: bool) -> Tall
     let mut examine = Some(random.next() % SOLVES);
     let mut query = 0;
     while tally.solves < SOLVES {
-        let draw = Draw::new(bodies, &mut random);
+        let mut draw = Draw::new(bodies, &mut random);
         let Draw { a, b, measure, .. } = draw;
+        draw.aim = MEASURES[measure].aim.unwrap_or(draw.aim);
         let mut round = Round {
             tally: &mut tally,
             iterations: Default::default(),
@@ -232,19 +234,17 @@ impl Site<'_> {
 
     fn cheap(&self, tally: &mut Tally, answer: &Answer) {
         let (lower, upper) = answer.bracket();
-        let (width, accuracy) = (upper - lower, Options::default().accuracy());
-        let narrow = width <= answer.tolerance(self.a, self.b, accuracy);
         let mut check = |check: Check, passed: bool| {
             tally.check(check, passed, (self.block, self.query), || self.tell(answer));
         };
         check(Check::InOrder, lower <= upper);
-        check(Check::Converged, answer.converged());
-        check(Check::Honest, narrow == answer.converged());
+        check(Check::Converged, answer.converged(self.pose_a, self.pose_b));
+        check(Check::Honest, answer.is_honest(self.a, self.b));
         check(Check::Capped, answer.iterations() <= MAX_ITERATIONS);
     }
 
     fn thorough(&self, tally: &mut Tally, answer: &Answer) {
-        let Some(verdict) = answer.verdict((self.a, self.pose_a), (self.b, self.pose_b)) else { return };
+        let Some(verdict) = Verdict::of(answer, (self.a, self.pose_a), (self.b, self.pose_b)) else { return };
         let tell = || format!("truth {:e}: {}", verdict.truth, self.tell(answer));
         tally.check(Check::Truth, verdict.inside, (self.block, self.query), tell);
         tally.check(Check::Decided, verdict.decided, (self.block, self.query), tell);

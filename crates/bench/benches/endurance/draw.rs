@@ -22,6 +22,12 @@ pub(crate) enum Style {
 
 const STYLES: [Style; 5] = [Style::Random, Style::Trajectory, Style::Grazing, Style::Aligned, Style::Far];
 
+/// Where two bodies are, or what stands for the second one.
+pub(crate) type Aim = fn((&Body, &Pose), (&Body, &Pose)) -> Option<(Vector3<f64>, f64)>;
+
+/// Number of measures.
+pub(crate) const MEASURES: usize = 7;
+
 /// The pair, the measure and the poses of one round.
 pub(crate) struct Draw<'a, 'r> {
     pub(crate) a: &'a Body,
@@ -30,6 +36,8 @@ pub(crate) struct Draw<'a, 'r> {
     pub(crate) style: Style,
     /// Whether many poses are asked for at once.
     pub(crate) batches: bool,
+    /// What grazing poses are made by.
+    pub(crate) aim: Aim,
     random: &'r mut Seeded,
     at: (Pose, Pose),
     drift: (Vector3<f64>, Vector3<f64>),
@@ -40,15 +48,18 @@ impl<'a, 'r> Draw<'a, 'r> {
     pub(crate) fn new(bodies: &'a [Body], random: &'r mut Seeded) -> Self {
         let (a, b) = (&bodies[random.index(bodies.len())], &bodies[random.index(bodies.len())]);
         // Distances in batches take the least time: most queries are of that kind.
-        let (measure, batches) = match random.index(20) {
+        let (measure, batches) = match random.index(24) {
             0..12 => (0, true),
             12..16 => (0, false),
             16..18 => (1, false),
-            _ => (2, false),
+            18..20 => (2, false),
+            k => (k - 17, false),
         };
+        debug_assert!(measure < MEASURES);
         let style = STYLES[random.index(STYLES.len())];
         let at = (Pose::identity(), Pose::identity());
-        Self { a, b, measure, style, batches, random, at, drift: (Vector3::zeros(), Vector3::zeros()), left: 0 }
+        let drift = (Vector3::zeros(), Vector3::zeros());
+        Self { a, b, measure, style, batches, aim: between_bodies, random, at, drift, left: 0 }
     }
 
     fn sum(&self) -> f64 {
@@ -101,14 +112,11 @@ impl<'a, 'r> Draw<'a, 'r> {
 
     fn grazing(&mut self) -> (Pose, Pose) {
         let (first, second) = self.independent();
-        // Any solver's normal will do: it only aims. A coarse answer is enough.
-        let options = Options::default().with_accuracy(1e-6).expect("within range");
-        let answer = distance(self.a, &first, self.b, &second, &options, &mut WarmStart::default());
-        let Some(normal) = answer.normal else { return (first, second) };
+        let Some((normal, apart)) = (self.aim)((self.a, &first), (self.b, &second)) else { return (first, second) };
         let size = self.a.circumscribed().radius.min(self.b.circumscribed().radius);
         let sign = if self.random.index(3) == 0 { -1.0 } else { 1.0 };
         let gap = sign * size * self.random.between(1e-12, 1e-2);
-        (first, shifted(&second, normal * (answer.upper - gap)))
+        (first, shifted(&second, normal * (apart - gap)))
     }
 
     fn aligned(&mut self) -> (Pose, Pose) {
@@ -133,4 +141,12 @@ impl<'a, 'r> Draw<'a, 'r> {
         let by = self.random.unit() * self.random.between(1.0, 1e9);
         (shifted(&first, by), shifted(&second, by))
     }
+}
+
+/// Their normal, from the second to the first, and about their distance, metres. Any solver's will
+/// do: it only aims.
+fn between_bodies(a: (&Body, &Pose), b: (&Body, &Pose)) -> Option<(Vector3<f64>, f64)> {
+    let options = Options::default().with_accuracy(1e-6).expect("within range");
+    let answer = distance(a.0, a.1, b.0, b.1, &options, &mut WarmStart::default());
+    Some((answer.normal?, answer.upper))
 }

@@ -18,11 +18,13 @@ mod sos;
 
 mod block;
 mod catalogue;
+mod companion;
 mod draw;
 mod measures;
 mod state;
 mod summary;
 mod tally;
+mod verdict;
 
 use clap::Parser;
 use state::State;

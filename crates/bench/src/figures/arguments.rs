@@ -35,6 +35,7 @@ pub(super) enum Figure {
     Sets(SetsArgs),
     Table1(Table1Args),
     Tables(TablesArgs),
+    Ablation(AblationArgs),
     #[command(hide = true)]
     Fit(FitArgs),
 }
@@ -82,6 +83,32 @@ pub(super) struct Table1Args {
     /// only what the pictures show, and draw it
     #[arg(long, conflicts_with = "quick")]
     pub(super) redraw: bool,
+}
+
+/// What is lost without each stage of a search: switched off one at a time, over draws as those of
+/// the endurance bench, other questions, the stability families and the named rescues
+///
+/// Writes ablation.csv and fills its blocks in the pages of --out; names what is rescued on the
+/// standard output. Fails where a bracket is wrong without some stage. Needs a build whose stages can
+/// be switched off, and whose times are not those of the library. A million queries take about
+/// MINUTES minutes on one core.
+///
+/// cargo run --release -p sublevel-bench --features ablation -- ablation --queries 3e6 --out docs
+#[derive(Debug, Args)]
+pub(super) struct AblationArgs {
+    /// Draws of distances and overlaps, such as 3e6; a tenth as many of other questions
+    #[arg(long, value_name = "COUNT", default_value = "1e5", value_parser = count)]
+    pub(super) queries: f64,
+    /// Folder for the CSV, with the pages that show it; made with its parents when it is not there
+    #[arg(long, value_name = "DIR", default_value = "sublevel-chart")]
+    pub(super) out: PathBuf,
+}
+
+/// A number of queries.
+fn count(text: &str) -> Result<f64, String> {
+    let count: f64 = text.parse().map_err(|_| format!("'{text}' is not a number such as 1e5"))?;
+    // A u64 that a double holds.
+    if (10.0..=1e15).contains(&count) { Ok(count) } else { Err(format!("{text} is not between 10 and 1e15")) }
 }
 
 /// Write the numbers of pages again from the CSV files: nothing is measured

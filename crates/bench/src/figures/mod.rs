@@ -1,5 +1,6 @@
 //! The figures, and the command line that makes them.
 
+mod ablation;
 mod arguments;
 mod output;
 mod stability;
@@ -19,6 +20,7 @@ use crate::sets::sets;
 use crate::speed::speed;
 use crate::stability::Method;
 use crate::warm::warm;
+use ablation::run_ablation;
 use arguments::{Arguments, Common, Figure, FitArgs};
 use clap::Parser;
 use indicatif::ProgressBar;
@@ -45,6 +47,7 @@ pub fn main() -> ExitCode {
 fn run(figure: &Figure) -> Result<(), Box<dyn Error>> {
     let drawn = match figure {
         Figure::All(args) => return run_all(&args.common),
+        Figure::Ablation(args) => return run_ablation(args),
         Figure::Stability(args) => return run_stability(args),
         Figure::Fit(args) => return run_fit(args),
         Figure::Speed(args) if args.common.redraw => redraw(&args.common.out, "speed"),

@@ -65,5 +65,11 @@ pub use time_of_impact::{
 pub use translation_hessian::translation_hessian;
 pub use warm::WarmStart;
 
+/// The stages of a search, which can be switched off to count what is lost without them.
+#[cfg(feature = "ablation")]
+pub mod stages {
+    pub use super::solver::stages::{Stage, asked, except};
+}
+
 #[cfg(test)]
 mod tests;

@@ -17,7 +17,9 @@ pub mod limits;
 pub mod motion;
 pub mod placement;
 pub mod primitives;
+pub mod rescues;
 pub mod scale;
+pub mod soak;
 pub mod ties;
 
 pub use crate::random::Draws;

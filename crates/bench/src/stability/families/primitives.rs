@@ -12,7 +12,7 @@ use sublevel::body::{Body, Compound};
 use sublevel::measure::{
     HalfSpace, Options, WarmStart, distance, distance_to_capsule, distance_to_half_space, distance_to_point,
 };
-use sublevel_testkit::bodies::{b, cylinder, e, q};
+use sublevel_testkit::bodies::{b, cut, cylinder, e, q};
 use sublevel_testkit::catalogue::placement::OFFSETS;
 use sublevel_testkit::catalogue::primitives::contact::{self, Slide, TOUCHING};
 use sublevel_testkit::catalogue::primitives::{COUNT, Flaw, Pair, Solved, data, placement, scale};
@@ -407,12 +407,19 @@ pub(super) fn ill_conditioned(seed: u64, method: Method) -> Put {
     put(&data::extreme(seed, &mut random(125, seed)), method)
 }
 
-/// The level distance among balls, boxes and cylinders, and over them; what is none of bodies has
+/// The level distance among balls, boxes, cylinders and what slabs cut, and over them; what is none of bodies has
 /// none.
 pub(super) fn saturation(seed: u64, method: Method) -> Put {
     static ZOO: OnceLock<Vec<Body>> = OnceLock::new();
     let zoo = ZOO.get_or_init(|| {
-        vec![e(0.6, 0.6, 0.6), b(0.6, 0.9, 0.3), cylinder(0.5, 0.8), e(1.0, 0.7, 0.4), q(8, 0.8, 0.5, 1.1)]
+        vec![
+            e(0.6, 0.6, 0.6),
+            b(0.6, 0.9, 0.3),
+            cylinder(0.5, 0.8),
+            e(1.0, 0.7, 0.4),
+            q(8, 0.8, 0.5, 1.1),
+            cut(0.8, 0.5, 1.1),
+        ]
     });
     saturation_of(zoo, &mut random(127, seed), method)
 }

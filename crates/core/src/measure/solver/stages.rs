@@ -1,10 +1,13 @@
 //! The stages of a search. A stage that fails hands on to the next, so that a broken one would be
 //! replaced without a trace: tests switch the others off and have each solve a catalogue alone
-//! (`tests/stages/`).
+//! (`tests/stages/`), and the feature `ablation` lets the bench count what is lost without one.
+
+// Outside of the crate these are seen with the feature `ablation` only.
+#![cfg_attr(not(feature = "ablation"), allow(unreachable_pub))]
 
 /// A method that finds an answer, or a part of one, which another one would find as well.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::measure) enum Stage {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
     /// Newton's method on one body, smooth or with edges, against a shape with a closed form.
     ClosedForm,
     /// Continuation from the answer before.
@@ -68,25 +71,72 @@ pub(in crate::measure) enum Stage {
     UnsureDeepest,
     /// A restart of the closed forms from the least value over the shape.
     ExactLevel,
+    /// Newton's method with an active set for a body with edges against a shape with a closed form.
+    EdgesBesideShape,
 }
 
-/// Whether a stage may run: always, but in tests that switch it off.
-#[cfg(not(test))]
+#[cfg(any(test, feature = "ablation"))]
+impl Stage {
+    /// All of them, parts of stages last.
+    pub const ALL: [Self; 34] = [
+        Self::ClosedForm,
+        Self::Follow,
+        Self::Seek,
+        Self::Edges,
+        Self::Newton,
+        Self::Ray,
+        Self::SupportTables,
+        Self::Deepest,
+        Self::InteriorDistance,
+        Self::InteriorLevel,
+        Self::Refinement,
+        Self::Alignment,
+        Self::Saturation,
+        Self::Lanes,
+        Self::Balls,
+        Self::Planes,
+        Self::DirectionSampling,
+        Self::CompassSearch,
+        Self::SupportLanes,
+        Self::SupportNewton,
+        Self::SupportInterior,
+        Self::AlongAxis,
+        Self::ProjectionSteps,
+        Self::ProjectionInterior,
+        Self::Interpolation,
+        Self::Curvature,
+        Self::Halving,
+        Self::MovingBalls,
+        Self::PlaneOfA,
+        Self::PlaneOfB,
+        Self::Again,
+        Self::UnsureDeepest,
+        Self::ExactLevel,
+        Self::EdgesBesideShape,
+    ];
+}
+
+/// Whether a stage may run: always, but where stages are switched off for a count.
+#[cfg(not(any(test, feature = "ablation")))]
 #[inline(always)]
 pub(in crate::measure) fn runs(_: Stage) -> bool {
     true
 }
 
 #[cfg(test)]
-pub(in crate::measure) use mask::{asked, except, only, runs};
+pub(in crate::measure) use mask::only;
+#[cfg(any(test, feature = "ablation"))]
+pub(in crate::measure) use mask::runs;
+#[cfg(any(test, feature = "ablation"))]
+pub use mask::{asked, except};
 
-#[cfg(test)]
+#[cfg(any(test, feature = "ablation"))]
 mod mask {
     use super::Stage;
     use std::cell::Cell;
 
     thread_local! {
-        /// A bit for each stage that may run; tests run in threads of their own.
+        /// A bit for each stage that may run on this thread.
         static MASK: Cell<u64> = const { Cell::new(u64::MAX) };
         /// A bit for each stage that has come to its turn.
         static ASKED: Cell<u64> = const { Cell::new(0) };
@@ -97,21 +147,23 @@ mod mask {
         MASK.get() >> stage as u64 & 1 == 1
     }
 
-    /// Does `work`, and which of these stages came to their turn.
-    pub(in crate::measure) fn asked<T>(stages: &[Stage], work: impl FnOnce() -> T) -> (T, Vec<Stage>) {
+    /// Does `work` on this thread, and which stages came to their turn.
+    pub fn asked<T>(work: impl FnOnce() -> T) -> (T, impl Iterator<Item = Stage>) {
         ASKED.set(0);
         let done = work();
-        (done, stages.iter().copied().filter(|stage| ASKED.get() >> *stage as u64 & 1 == 1).collect())
+        let asked = ASKED.get();
+        (done, Stage::ALL.into_iter().filter(move |stage| asked >> *stage as u64 & 1 == 1))
     }
 
     /// Does `work` with no other stages than these, and the parts of stages.
+    #[cfg(test)]
     pub(in crate::measure) fn only<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
         let parts = u64::MAX << Stage::Again as u64;
         with(stages.iter().fold(parts, |mask, stage| mask | 1 << *stage as u64), work)
     }
 
-    /// Does `work` without these stages.
-    pub(in crate::measure) fn except<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
+    /// Does `work` on this thread without these stages.
+    pub fn except<T>(stages: &[Stage], work: impl FnOnce() -> T) -> T {
         with(stages.iter().fold(u64::MAX, |mask, stage| mask & !(1 << *stage as u64)), work)
     }
 

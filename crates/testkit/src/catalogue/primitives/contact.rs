@@ -59,11 +59,13 @@ enum Flat {
     HalfSpace,
     /// Its face, of no curvature in the middle.
     Smooth,
+    /// Its face, which a slab has cut.
+    Cut,
 }
 
 impl Flat {
     /// All pairs that have a measure; a half-space is below.
-    const PAIRS: [[Self; 2]; 16] = [
+    const PAIRS: [[Self; 2]; FLATS as usize] = [
         [Self::Cuboid, Self::Capsule],
         [Self::Cuboid, Self::Disc],
         [Self::HalfSpace, Self::Cuboid],
@@ -80,6 +82,19 @@ impl Flat {
         [Self::Roller, Self::Roller],
         [Self::HalfSpace, Self::Roller],
         [Self::Segment, Self::Disc],
+        [Self::Cut, Self::Cuboid],
+        [Self::Disc, Self::Cut],
+        [Self::Cut, Self::Capsule],
+        [Self::HalfSpace, Self::Cut],
+        [Self::Segment, Self::Cut],
+        [Self::Cut, Self::Smooth],
+        [Self::Cut, Self::Cut],
+        [Self::Roller, Self::Cut],
+        [Self::HalfSpace, Self::Smooth],
+        [Self::Segment, Self::Smooth],
+        [Self::Roller, Self::Smooth],
+        [Self::Disc, Self::Capsule],
+        [Self::Roller, Self::Disc],
     ];
 
     fn make(self, [x, y, z]: [f64; 3]) -> (Shape, UnitQuaternion<f64>, f64) {
@@ -93,6 +108,7 @@ impl Flat {
             Self::Segment => (of(Kind::Segment), lying, 0.0),
             Self::HalfSpace => (Shape::HalfSpace, upright, 0.0),
             Self::Smooth => (of(Kind::Smooth), upright, z),
+            Self::Cut => (of(Kind::Cut), upright, 0.6 * z),
         }
     }
 
@@ -106,28 +122,33 @@ impl Flat {
     }
 }
 
-/// Cases of [`parallel_faces`]: 16 pairs, 10 gaps at 8 tilts.
-pub const PARALLEL_FACES: u64 = 1280;
+/// Pairs of flat and straight sides.
+const FLATS: u64 = 29;
 
-/// Family 3. Flat and straight sides, gap 1e-3 to 1e-12 m, tilt none and 1e-9 to 1e-3 rad.
+/// Cases of [`parallel_faces`]: all pairs, 10 gaps at 11 tilts.
+pub const PARALLEL_FACES: u64 = FLATS * 10 * 11;
+
+/// Family 3. Flat and straight sides, gap 1e-3 to 1e-12 m, tilt none and 1e-16 to 1e-3 rad.
 pub fn parallel_faces(index: u64) -> Pair {
-    let gap = 10_f64.powi(-3 - (index / 16 % 10) as i32);
-    let tilt = match index / 160 % 8 {
+    let gap = 10_f64.powi(-3 - (index / FLATS % 10) as i32);
+    let tilt = match index / (10 * FLATS) % 11 {
         0 => 0.0,
-        k => 10_f64.powi(-10 + k as i32),
+        // Below and above what a cosine keeps.
+        k @ 1..=3 => 10_f64.powi(-18 + 2 * k as i32),
+        k => 10_f64.powi(-13 + k as i32),
     };
     let pair = Flat::pair(index, gap, Vector3::new(0.6 * tilt, 0.8 * tilt, 0.0));
     Pair { what: format!("{}gap {gap:e} m, tilt {tilt:e} rad", pair.what), ..pair }
 }
 
-/// Cases of [`parallel_flats`]: 16 pairs at 7 tilts with 9 accuracies.
-pub const PARALLEL_FLATS: u64 = 1008;
+/// Cases of [`parallel_flats`]: all pairs at 9 tilts with 9 accuracies.
+pub const PARALLEL_FLATS: u64 = FLATS * 9 * 9;
 
 /// Family 13. Flats a tenth apart: the error falls to the floor that `Options::with_accuracy`
 /// states for flat surfaces, beyond it the status says.
 pub fn parallel_flats(index: u64) -> Pair {
-    let tilt = [0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2][(index / 16 % 7) as usize];
-    let accuracy = 10_f64.powi(-[4, 6, 8, 9, 10, 11, 12, 13, 14][(index / 112 % 9) as usize]);
+    let tilt = [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2][(index / FLATS % 9) as usize];
+    let accuracy = 10_f64.powi(-[4, 6, 8, 9, 10, 11, 12, 13, 14][(index / (9 * FLATS) % 9) as usize]);
     let pair = Flat::pair(index, 0.1, Vector3::new(0.6 * tilt, -0.8 * tilt, 0.0));
     let floor = 1e-12 * (pair.a.reach_m().max(pair.b.reach_m()) + 0.1);
     let wanted = accuracy * pair.size();
@@ -149,14 +170,14 @@ pub fn at_gap(index: u64, gap: f64, random: &mut dyn Draws) -> Pair {
     Pair { accuracy: sublevel_core::measure::DEFAULT_ACCURACY, ..fine.moved_to(gap) }
 }
 
-/// Cases of [`tips`]: 8 tips on 4 flats, at 4 gaps in 4 places.
-pub const TIPS: u64 = 512;
+/// Cases of [`tips`]: 9 tips on 5 flats, at 4 gaps in 4 places.
+pub const TIPS: u64 = 720;
 
 /// Family 14. A tip that points down at a flat: corners, rims, ends, and one of degree 8.
 pub fn tips(index: u64, random: &mut dyn Draws) -> Option<Pair> {
     let turned = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
     let still = UnitQuaternion::identity();
-    let (tip, turn, height) = match index % 8 {
+    let (tip, turn, height) = match index % 9 {
         0 => (Shape::of_sizes(Kind::Capsule, [0.1, 0.1, 0.9]), still, 1.0),
         1 => {
             // A corner of a cube straight down.
@@ -172,23 +193,25 @@ pub fn tips(index: u64, random: &mut dyn Draws) -> Option<Pair> {
         4 => (Shape::Point, still, 0.0),
         5 => (Shape::of_sizes(Kind::Ball, [0.01; 3]), still, 0.01),
         6 => (Shape::of_sizes(Kind::Smooth, [0.1, 0.1, 1.0]), still, 1.0),
+        7 => (Shape::of_sizes(Kind::Ellipsoid, [0.1, 0.2, 1.0]), still, 1.0),
         // An edge.
         _ => {
             (Shape::of_sizes(Kind::Cuboid, [0.2, 0.5, 0.2]), turned(Vector3::y(), FRAC_PI_2 * 0.5), 0.4 * FRAC_1_SQRT_2)
         }
     };
-    let (flat, top) = match index / 8 % 4 {
+    let (flat, top) = match index / 9 % 5 {
         0 => (Shape::of_sizes(Kind::Cuboid, [1.0, 1.0, 0.1]), 0.1),
         1 => (Shape::HalfSpace, 0.0),
         2 => (Shape::of_sizes(Kind::Cylinder, [1.0, 1.0, 0.01]), 0.01),
+        3 => (Shape::of_sizes(Kind::Cut, [1.0, 1.0, 0.1]), 0.06),
         _ => (Shape::of_sizes(Kind::Smooth, [1.0, 1.0, 0.1]), 0.1),
     };
     // Capsules and points are not measured against half-spaces.
     if matches!((&tip, &flat), (Shape::Capsule(_) | Shape::Point, Shape::HalfSpace)) {
         return None;
     }
-    let gap = [1e-9, 1e-6, 1e-3, 0.3][(index / 32 % 4) as usize];
-    let aside = [0.0, 1e-6, 1e-3, 0.2][(index / 128 % 4) as usize];
+    let gap = [1e-9, 1e-6, 1e-3, 0.3][(index / 45 % 4) as usize];
+    let aside = [0.0, 1e-6, 1e-3, 0.2][(index / 180 % 4) as usize];
     let turn = turned(Vector3::z(), random.signed()) * turn;
     let place = pose(Vector3::new(aside, -0.5 * aside, top + height + gap), &UnitQuaternion::new_normalize(*turn));
     Some(Pair::new(flat, Pose::identity(), tip, place, format!("gap {gap:e} m, {aside:e} m aside")))

@@ -42,7 +42,7 @@ pub fn attempts() -> Vec<Attempt> {
 }
 
 /// Kinds of [`extreme`].
-pub const EXTREMES: u64 = 10;
+pub const EXTREMES: u64 = 32;
 
 /// A shape of sizes from 1e-12 to 1e12 m, or of both, and an ordinary one near it.
 pub fn extreme(index: u64, random: &mut dyn Draws) -> Pair {
@@ -57,6 +57,29 @@ pub fn extreme(index: u64, random: &mut dyn Draws) -> Pair {
         6 => (of(Kind::Cuboid, [1e4, 1.0, 1e-2]), Kind::Capsule),
         7 => (of(Kind::Cylinder, [1e-4, 0.0, 1e2]), Kind::Capsule),
         8 => (of(Kind::Cuboid, [1e-2, 1.0, 1e4]), Kind::HalfSpace),
+        // One size alone, of each shape.
+        10 => (of(Kind::Ball, [1e9, 0.0, 0.0]), Kind::Cut),
+        11 => (of(Kind::Ball, [1e-9, 0.0, 0.0]), Kind::Cut),
+        12 => (of(Kind::Ellipsoid, [1e9, 1.0, 1.0]), Kind::Cuboid),
+        13 => (of(Kind::Ellipsoid, [1.0, 1.0, 1e-9]), Kind::Cylinder),
+        14 => (of(Kind::Cuboid, [1e9, 1.0, 1.0]), Kind::Smooth),
+        15 => (of(Kind::Cuboid, [1.0, 1e-9, 1.0]), Kind::Smooth),
+        16 => (of(Kind::Cuboid, [1.0, 1.0, 1e9]), Kind::Cylinder),
+        17 => (of(Kind::Cuboid, [1.0, 1.0, 1e-9]), Kind::Cuboid),
+        18 => (of(Kind::Cylinder, [1e9, 0.0, 1.0]), Kind::Smooth),
+        19 => (of(Kind::Cylinder, [1e-9, 0.0, 1.0]), Kind::Cut),
+        20 => (of(Kind::Cylinder, [1.0, 0.0, 1e9]), Kind::Cuboid),
+        21 => (of(Kind::Cylinder, [1.0, 0.0, 1e-9]), Kind::Cylinder),
+        22 => (of(Kind::Capsule, [1e9, 0.0, 1.0]), Kind::Cut),
+        23 => (of(Kind::Capsule, [1.0, 0.0, 1e9]), Kind::Cuboid),
+        24 => (of(Kind::Capsule, [1e-9, 0.0, 1.0]), Kind::Smooth),
+        25 => (of(Kind::Segment, [0.0, 0.0, 1e9]), Kind::Cut),
+        26 => (of(Kind::Segment, [0.0, 0.0, 1e-9]), Kind::Cuboid),
+        27 => (of(Kind::Smooth, [1.0, 1.0, 1e9]), Kind::Capsule),
+        28 => (of(Kind::Smooth, [1e-9, 1.0, 1.0]), Kind::Point),
+        29 => (of(Kind::Cut, [1.0, 1.0, 1e9]), Kind::Cuboid),
+        30 => (of(Kind::Cut, [1e-9, 1.0, 1.0]), Kind::HalfSpace),
+        31 => (of(Kind::Ellipsoid, [1e-9, 1e9, 1.0]), Kind::Capsule),
         _ => (of(Kind::Cylinder, [1e2, 0.0, 1e-4]), Kind::Point),
     };
     let second = of(second, [0.3, 0.5, 0.7]);

@@ -22,7 +22,7 @@ pub use solved::{Reference, Solved};
 use sublevel_core::measure::Pose;
 
 /// The pairs that measures are defined for, each with both orders.
-pub const PAIRS: [[Kind; 2]; 36] = {
+pub const PAIRS: [[Kind; 2]; 45] = {
     use Kind::{Ball, Capsule, Cuboid, Cut, Cylinder, Ellipsoid, HalfSpace, Point, Segment, Smooth};
     // The first of them have every primitive.
     [
@@ -62,6 +62,15 @@ pub const PAIRS: [[Kind; 2]; 36] = {
         [Point, Cut],
         [Segment, Cut],
         [HalfSpace, Cut],
+        [Cut, Smooth],
+        [Cuboid, Cut],
+        [Cut, Cylinder],
+        [Ellipsoid, Cut],
+        [Ball, Cut],
+        [Cut, Cut],
+        [Point, Ball],
+        [Segment, Ball],
+        [HalfSpace, Ellipsoid],
     ]
 };
 

@@ -38,26 +38,17 @@ pub fn common_point(index: u64, random: &mut dyn Draws) -> Pair {
     Pair::new(a, pose_a, b, pose_b, "in overlap")
 }
 
-/// Cases of [`along_an_axis`]: 8 pairs along 3 axes by 14 shifts.
-pub const ALONG_AN_AXIS: u64 = 336;
+/// Cases of [`along_an_axis`]: all pairs along 3 axes by 14 shifts.
+pub const ALONG_AN_AXIS: u64 = 3 * 14 * COUNT;
 
-/// Family 6. Alike, or over a half-space, with integer coordinates: the distance is what the offset
-/// exceeds both half-sizes by.
+/// Family 6. Of the same sizes, or over a half-space, with integer coordinates: each mirrors itself in
+/// the planes of the axes, so that the distance is what the offset exceeds both half-sizes by.
 pub fn along_an_axis(index: u64) -> Pair {
     let sizes = [1.0, 2.0, 3.0];
-    let kinds = match index % 8 {
-        0 => [Kind::Capsule, Kind::Capsule],
-        1 => [Kind::HalfSpace, Kind::Cuboid],
-        2 => [Kind::Cuboid, Kind::Capsule],
-        3 => [Kind::Segment, Kind::Segment],
-        4 => [Kind::HalfSpace, Kind::Cylinder],
-        5 => [Kind::Cylinder, Kind::Capsule],
-        6 => [Kind::HalfSpace, Kind::Ball],
-        _ => [Kind::Ball, Kind::Point],
-    };
+    let kinds = PAIRS[(index % COUNT) as usize];
     let shifts = [-12.0, -7.0, -6.0, -5.0, -4.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 100.0];
-    let axis = (index / 8 % 3) as usize;
-    let shift: f64 = shifts[(index / 24 % 14) as usize];
+    let axis = (index / COUNT % 3) as usize;
+    let shift: f64 = shifts[(index / (3 * COUNT) % 14) as usize];
     let [half_a, half_b] = kinds.map(|kind| Shape::halves(kind, sizes)[axis]);
     let [a, b] = kinds.map(|kind| Shape::of_sizes(kind, sizes));
     let toward = Vector3::ith(axis, 1.0);

@@ -53,20 +53,24 @@ pub fn units(index: u64, s: f64, seed: u64) -> [Pair; 2] {
 }
 
 /// Needles of family 12 and partners of each.
-pub const NEEDLES: u64 = 4;
+pub const NEEDLES: u64 = 6;
 /// See [`NEEDLES`].
-pub const PARTNERS: u64 = 9;
+pub const PARTNERS: u64 = 10;
+/// Aspects of each pair, 1e2 and more.
+const ASPECTS: u64 = 5;
 
-/// Family 12. Aspects of 1e2 to 1e5: near each other, or lying on a plate. None where no measure is
+/// Family 12. Aspects of 1e2 to 1e6: near each other, or lying on a plate. None where no measure is
 /// for the two.
 pub fn needles(index: u64, random: &mut dyn Draws) -> Option<Pair> {
     let of = Shape::of_sizes;
-    let thin = 10_f64.powi(-((index / (NEEDLES * PARTNERS) % 4) as i32 + 2));
+    let thin = 10_f64.powi(-((index / (NEEDLES * PARTNERS) % ASPECTS) as i32 + 2));
     let first = match index % NEEDLES {
         0 => of(Kind::Capsule, [thin, thin, 1.0]),
         1 => of(Kind::Cylinder, [thin, thin, 1.0]),
         2 => of(Kind::Cuboid, [thin, 2.0 * thin, 1.0]),
-        _ => of(Kind::Segment, [0.0, 0.0, 1.0]),
+        3 => of(Kind::Segment, [0.0, 0.0, 1.0]),
+        4 => of(Kind::Ellipsoid, [thin, 2.0 * thin, 1.0]),
+        _ => of(Kind::Cut, [thin, 2.0 * thin, 1.0]),
     };
     let second = match index / NEEDLES % PARTNERS {
         0 => of(Kind::Cuboid, [1.0, 1.0, 1e-3]),
@@ -77,6 +81,7 @@ pub fn needles(index: u64, random: &mut dyn Draws) -> Option<Pair> {
         5 => of(Kind::Cuboid, [1.0, 0.5, thin]),
         6 => of(Kind::Ball, [thin; 3]),
         7 => Shape::HalfSpace,
+        8 => of(Kind::Cut, [1.0, 1.0, thin]),
         _ => Shape::Point,
     };
     let is_body = matches!(first, Shape::Body(_));
@@ -96,4 +101,4 @@ pub fn needles(index: u64, random: &mut dyn Draws) -> Option<Pair> {
 }
 
 /// All of them.
-pub const ALL_NEEDLES: u64 = 4 * NEEDLES * PARTNERS;
+pub const ALL_NEEDLES: u64 = ASPECTS * NEEDLES * PARTNERS;

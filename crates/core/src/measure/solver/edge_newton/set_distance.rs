@@ -31,6 +31,7 @@ use crate::measure::solver::exact_shape::{
     Cuboid, Cylinder, LONGEST_STEP, Offset, Projectable, Segment, SeparatingPlane, WORTH_A_BRACKET_SQUARED, cold_start,
     seen_from, separating_plane,
 };
+use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{ALIGNED, Plane, Relative, Side, TAYLOR_ROUNDING, moved};
 use crate::polynomial::{Simd, WithSimd};
@@ -136,6 +137,9 @@ impl WithSimd for EdgeShapeQuery<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        if !runs(Stage::EdgesBesideShape) {
+            return Err(0);
+        }
         match *self.form.shape() {
             ExactShape::Cuboid { half_extents_m, .. } => self.against(simd, Cuboid { half_extents: half_extents_m }),
             ExactShape::Cylinder { radius_m, half_height_m, .. } => {
