@@ -445,13 +445,19 @@ impl Search<'_, '_> {
             (None, false) => MotionVerdict::Free,
         };
         let alpha = contact.as_ref().map_or(self.alpha, |contact| self.alpha.min(contact.s));
+        let open = self.open.take();
+        let (contact, open) = match contact {
+            Some(contact) => (Some(contact.clone()), open.filter(|open| open.s < contact.s)),
+            None => (open, None),
+        };
         let is_certified = self.options.certificate && verdict == MotionVerdict::Free;
         let records = std::mem::take(&mut self.records);
         MotionAnswer {
             verdict,
             alpha,
             clearance_lower_m: self.clearance,
-            contact: contact.or_else(|| self.open.take()),
+            contact,
+            open,
             ended_early,
             configurations: self.configurations,
             solved: self.solved,
