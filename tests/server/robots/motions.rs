@@ -181,9 +181,9 @@ async fn a_pair_that_is_open_before_the_first_contact_is_named() {
     let (_server, client, _clients, robot) = served(dir.path()).await;
     cell(&client, &robot).await;
     // What is held moves on a circle with a radius of 1.3 m: half a radian on its way it passes a
-    // ball at 18 mm, and at a right angle it meets another one.
+    // ball at 0.2 mm, and at a right angle it meets another one.
     let thing = client.create_ball("thing", 0.05).await.expect("a ball");
-    let beside = at(1.3 * 0.5_f64.sin(), 0.118, 0.3 + 1.3 * 0.5_f64.cos());
+    let beside = at(1.3 * 0.5_f64.sin(), 0.1002, 0.3 + 1.3 * 0.5_f64.cos());
     client
         .put_objects("cell", [("beside", &thing, beside), ("post", &thing, at(1.3, 0.0, 0.3))])
         .await

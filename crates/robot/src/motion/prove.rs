@@ -413,7 +413,8 @@ impl Search<'_, '_> {
             return true;
         }
         let record = Record { interval: pair.interval, pair: pair.index, normal: (*n).into(), proof: proof() };
-        let holds = record.lower_m(self.problem, &mut self.workspace.placing) > pair.pair.threshold_m;
+        let is_apart = |lower: f64| lower > pair.pair.threshold_m;
+        let holds = is_apart(record.lower_m(self.problem, &mut self.workspace.placing, is_apart));
         if holds {
             self.records.push(record);
         }

@@ -135,15 +135,16 @@ fn a_near_miss_before_the_first_contact_is_told() {
     let problem = problem(hand(ball(0.1)), posts, 0.0);
     let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
     let expected = (std::f64::consts::FRAC_PI_2 - 2.0 * (0.3_f64 / 4.0).asin()) / 3.0;
-    let coarse = prove(&problem, &path, &MotionOptions { resolution_m: 1e-4, ..FIRST });
+    // Along the normal the hand moves by a second order only: much less than the resolution.
+    let coarse = prove(&problem, &path, &MotionOptions { resolution_m: 0.05, ..FIRST });
     assert_eq!(coarse.verdict, MotionVerdict::Contact);
     let (contact, open) = (coarse.contact.expect("a contact"), coarse.open.expect("an open pair"));
     assert_eq!(contact.items[1], MotionItem::Obstacle(1));
-    assert!(expected <= contact.s && contact.s - expected < 1e-4, "{} {expected}", contact.s);
+    assert!(expected <= contact.s && contact.s - expected < 0.02, "{} {expected}", contact.s);
     assert_eq!(open.items[1], MotionItem::Obstacle(0));
-    assert!(coarse.alpha <= open.s && (open.s - 0.5 / 3.0).abs() < 0.01 && open.s - coarse.alpha < 1e-4, "{open:?}");
-    assert!(open.lower_m > 0.0 && open.upper_m < 2e-4, "{open:?}");
-    // A resolution below the gap decides it, and the bracket closes.
+    assert!(coarse.alpha <= open.s && (open.s - 0.5 / 3.0).abs() < 0.02 && open.s - coarse.alpha < 0.02, "{open:?}");
+    assert!(open.lower_m > 0.0 && open.upper_m < 0.01, "{open:?}");
+    // A finer resolution decides it, and the bracket closes.
     let fine = prove(&problem, &path, &FIRST);
     let contact = fine.contact.expect("a contact");
     assert!(
@@ -154,7 +155,7 @@ fn a_near_miss_before_the_first_contact_is_told() {
     );
     // Without a contact it is the open pair that is told, as before.
     let short = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 1.0, 0.0]);
-    let passing = prove(&problem, &short, &MotionOptions { resolution_m: 1e-4, ..FIRST });
+    let passing = prove(&problem, &short, &MotionOptions { resolution_m: 0.05, ..FIRST });
     assert_eq!((passing.verdict, passing.open), (MotionVerdict::Undecided, None));
     assert_eq!(passing.contact.expect("an open pair").items[1], MotionItem::Obstacle(0));
 }
