@@ -1,5 +1,5 @@
 # Everything a fresh Debian or Ubuntu machine needs beyond Rust (rustup), make and a C compiler.
-.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills soak solvers
+.PHONY: help setup demo test check charts docs-numbers image acceptance endurance fuzz draws measures kills soak solvers robots
 
 help:
 	@echo 'make demo          fit two shapes, serve them, sweep one through the other, draw the curves'
@@ -8,7 +8,7 @@ help:
 	@echo 'make charts        measure beside other libraries, and draw: SUBLEVEL_DATA=DIR with the meshes'
 	@echo 'make docs-numbers  write the numbers of README.md and docs/ again from the CSV files in docs/'
 	@echo 'make image         build the container image of the server: BUILD= names another base image'
-	@echo 'make acceptance    what is too long for every change, all seven of these: SUBLEVEL_DATA=DIR'
+	@echo 'make acceptance    what is too long for every change, all eight of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
 	@echo '  make fuzz          1e6 damaged inputs for each reader of files and calls (RUNS=10000000 for more)'
 	@echo '  make draws         1e5 draws of each family of the stability tests (DRAWS=1000 for fewer)'
@@ -16,6 +16,7 @@ help:
 	@echo '  make kills         kill a server under load 1e3 times, with a ledger of its answers (KILLS=100 for fewer)'
 	@echo '  make soak          load a server for half an hour, and see its memory and descriptors (SOAK=60 for a minute)'
 	@echo '  make solvers       all tests of fits with each of the two solvers alone'
+	@echo '  make robots        1e5 states of an arm against its raw meshes, and its SRDF against what is proven'
 	@echo 'make setup         install missing system packages (demo and test do this first)'
 
 setup:
@@ -43,7 +44,7 @@ docs-numbers:
 image:
 	docker build -f deploy/container/Containerfile --target server $(if $(BUILD),--build-arg BUILD=$(BUILD)) -t sublevel .
 
-acceptance: endurance fuzz draws measures kills soak solvers
+acceptance: endurance fuzz draws measures kills soak solvers robots
 
 QUERIES ?= 1e8
 RUNS ?= 1000000
@@ -83,3 +84,7 @@ solvers: setup
 	        --skip tests::both_solvers_are_tried_unless_one_is_asked_for \
 	        --skip tests::sos::bad_input_is_refused_by_field || exit 1; \
 	done
+
+robots: setup
+	@[ -d '$(SUBLEVEL_DATA)' ] || { echo 'robots: the arm is missing; name the folder of the data: SUBLEVEL_DATA=DIR make robots' >&2; exit 1; }
+	SUBLEVEL_LONG=1 cargo test --release -p sublevel-bench --lib panda:: -- --include-ignored --nocapture

@@ -92,8 +92,14 @@ pub struct CheckedMotion {
     /// Of a contact, or of what is open: the two objects, and the path parameter at which it was
     /// seen.
     pub contact: Option<([String; 2], f64)>,
+    /// Of a contact, the first pair before it that is not decided at the resolution, and the path
+    /// parameter at which it was seen: `alpha` ends there.
+    pub open: Option<([String; 2], f64)>,
     /// JSON text; none unless it was asked for and the motion is free.
     pub certificate: Option<String>,
+    /// Of a motion that is invalid: the configuration that is wrong, counted over all motions of
+    /// the question, why, and the remedy.
+    pub reason: Option<String>,
 }
 
 /// Verdicts of motions.
@@ -128,13 +134,18 @@ impl Client {
         let response = self.queries().check_motions(question.asked(scene)).await.map_err(self.refused())?.into_inner();
         let verdicts = answer_wire::verdicts(&response.verdicts)?;
         let table = &response.objects;
-        let pairs = index_pairs(&response.pairs).map(|[a, b]| Some([name(table, a)?, name(table, b)?]));
+        let named = |[a, b]: [u32; 2]| Some([name(table, a)?, name(table, b)?]);
+        let pairs = index_pairs(&response.pairs).map(named);
+        let open: Vec<_> = index_pairs(&response.open_pairs).map(named).collect();
+        let text = |texts: &[String], row: usize| texts.get(row).filter(|text| !text.is_empty()).cloned();
         let rows = verdicts.into_iter().zip(pairs).enumerate().map(|(row, (verdict, pair))| CheckedMotion {
             verdict,
             alpha: number(&response.alpha, row),
             clearance_lower_m: number(&response.clearance_lower_m, row),
             contact: pair.map(|pair| (pair, number(&response.contact_s, row))),
-            certificate: response.certificates.get(row).filter(|text| !text.is_empty()).cloned(),
+            open: open.get(row).cloned().flatten().map(|pair| (pair, number(&response.open_s, row))),
+            certificate: text(&response.certificates, row),
+            reason: text(&response.reasons, row),
         });
         let motions: Vec<_> = rows.collect();
         if motions.len() != response.verdicts.len() {

@@ -9,7 +9,7 @@ use std::time::Duration;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt};
 
-use crate::scene::{Entry, JointsError, List, SceneError};
+use crate::scene::{Entry, JointsError, List, Part, SceneError};
 use crate::store::{CatalogueError, MAX_FORKS, StoreError};
 
 use super::limits::MAX_MESSAGE_BYTES;
@@ -32,9 +32,17 @@ impl Invalid {
     }
 }
 
+impl fmt::Display for Invalid {
+    /// As errors of the service say it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&short(format!("{}: {}", self.field, self.why)))
+    }
+}
+
 impl From<Invalid> for Status {
-    fn from(Invalid { field, why }: Invalid) -> Self {
-        let message = short(format!("{field}: {why}"));
+    fn from(invalid: Invalid) -> Self {
+        let message = invalid.to_string();
+        let Invalid { field, why } = invalid;
         let mut details = details(Reason::InvalidField);
         details.add_bad_request_violation(field, short(why));
         Self::with_error_details(Code::InvalidArgument, message, details)
@@ -325,6 +333,11 @@ fn path(at: &Entry, leaf: Leaf) -> String {
         List::Bases => "set_robot_bases",
         List::RobotRemovals => "remove_robots",
     };
+    match (at.part, leaf) {
+        (Part::Holder, Leaf::Name) => return format!("{list}[{}].attachment.to", at.index),
+        (Part::Touch(touch), Leaf::Name) => return format!("{list}[{}].attachment.touch[{touch}]", at.index),
+        _ => {}
+    }
     let leaf = match (at.list, leaf) {
         (List::Removals | List::Allow | List::Forbid | List::Detach | List::RobotRemovals, _) => "",
         (List::Joints | List::Bases, Leaf::Name) => ".robot",

@@ -217,11 +217,14 @@ struct Columns {
     clearance: Packed,
     pairs: Packed,
     contact_s: Packed,
+    open_pairs: Packed,
+    open_s: Packed,
     bounds: [Packed; 2],
     witnesses: Packed,
     normals: Packed,
     configurations: Packed,
     certificates: Vec<String>,
+    reasons: Vec<String>,
 }
 
 impl Columns {
@@ -232,15 +235,15 @@ impl Columns {
         self.clearance.number(clearance);
         self.configurations.index(answer.map_or(0, |answer| answer.configurations));
         let contact = answer.and_then(|answer| answer.contact.as_ref());
-        match contact {
-            Some(contact) => {
-                let slots = contact.items.map(|item| motions.slot(item));
-                slots.into_iter().for_each(|slot| self.pairs.index(self.names.place(slot, motions.scene())));
-            }
-            None => [NOTHING; 2].into_iter().for_each(|index| self.pairs.index(index)),
+        let open = answer.and_then(|answer| answer.open.as_ref());
+        for (column, at) in [(&mut self.pairs, contact), (&mut self.open_pairs, open)] {
+            let mut place = |item| self.names.place(motions.slot(item), motions.scene());
+            let indices = at.map_or([NOTHING; 2], |at| at.items.map(&mut place));
+            indices.into_iter().for_each(|index| column.index(index));
         }
         let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
         self.contact_s.number(number(contact.map(|contact| contact.s)));
+        self.open_s.number(number(open.map(|open| open.s)));
         self.bounds[0].number(number(contact.map(|contact| contact.lower_m)));
         self.bounds[1].number(number(contact.map(|contact| contact.upper_m)));
         for side in 0..2 {
@@ -254,18 +257,25 @@ impl Columns {
 
 fn response(answers: &[RobotMotionAnswer], motions: &RobotMotions) -> CheckMotionsResponse {
     let mut columns = Columns::default();
-    let mut complete = true;
-    for answer in answers {
+    let (mut complete, mut first) = (true, 0);
+    for (answer, path) in answers.iter().zip(motions.paths()) {
+        let mut reason = String::new();
         let (verdict, answer) = match answer {
             RobotMotionAnswer::Checked(answer) => (verdict(answer.verdict), Some(&**answer)),
-            RobotMotionAnswer::Invalid(..) => (proto::Verdict::Invalid, None),
+            RobotMotionAnswer::Invalid(point, error) => {
+                let field = format!("joint_values[{}]", first + point);
+                reason = Invalid::new(field, error).to_string();
+                (proto::Verdict::Invalid, None)
+            }
             RobotMotionAnswer::NotChecked => (proto::Verdict::NotChecked, None),
         };
+        first += path.points().len();
+        columns.reasons.push(reason);
         complete &= verdict != proto::Verdict::NotChecked && answer.is_none_or(|answer| !answer.ended_early);
         columns.row(verdict, answer, motions);
     }
     let [lower, upper] = columns.bounds;
-    let is_certified = columns.certificates.iter().any(|certificate| !certificate.is_empty());
+    let unless_empty = |texts: Vec<String>| if texts.iter().all(String::is_empty) { Vec::new() } else { texts };
     CheckMotionsResponse {
         scene_revision: motions.scene().revision(),
         verdicts: columns.verdicts.into_bytes(),
@@ -279,8 +289,11 @@ fn response(answers: &[RobotMotionAnswer], motions: &RobotMotions) -> CheckMotio
         witnesses_m: columns.witnesses.into_bytes(),
         normals: columns.normals.into_bytes(),
         configurations: columns.configurations.into_bytes(),
-        certificates: if is_certified { columns.certificates } else { Vec::new() },
+        certificates: unless_empty(columns.certificates),
         complete,
+        reasons: unless_empty(columns.reasons),
+        open_pairs: columns.open_pairs.into_bytes(),
+        open_s: columns.open_s.into_bytes(),
     }
 }
 

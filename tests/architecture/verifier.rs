@@ -53,8 +53,18 @@ fn certificates_are_checked_without_a_solver() {
     let files: BTreeMap<String, String> = files.collect();
     let verifier = reached(&["verify", "claim_of_problem"], &files);
     // The walk has found the files that the proof is made of.
-    for name in ["bound", "certificate", "claim", "claim_of_problem", "interval", "path", "placing", "planes", "verify"]
-    {
+    for name in [
+        "bound",
+        "certificate",
+        "claim",
+        "claim_of_problem",
+        "interval",
+        "path",
+        "placing",
+        "planes",
+        "screw",
+        "verify",
+    ] {
         assert!(verifier.contains(name), "{name} is no longer a part of what checks certificates: {verifier:?}");
     }
     let found: Vec<String> = verifier

@@ -49,6 +49,16 @@ async fn scene_updates() {
         };
         UpdateSceneRequest { attach: pairs.iter().map(attach).collect(), ..update() }
     };
+    let touch = |names: &[&str]| names.iter().filter_map(|name| subjects(name, name).a).collect::<Vec<_>>();
+    let touching = |name: &str| {
+        let mut update = attach(&[("a", "b")]);
+        update.attach[0].attachment = Some(Attachment { to: "b".into(), touch: touch(&["b", name]), pose: None });
+        update
+    };
+    let held = |to: &str, names: &[&str]| {
+        let attachment = Attachment { to: to.into(), pose: Some(at(1.0)), touch: touch(names) };
+        Object { attachment: Some(attachment), pose: None, ..object("c", &id, at(9.0)) }
+    };
     let cases = [
         (UpdateSceneRequest { scene: "elsewhere".into(), ..update() }, missing, "scene"),
         (UpdateSceneRequest { scene: String::new(), ..update() }, invalid, "scene"),
@@ -73,8 +83,15 @@ async fn scene_updates() {
         (UpdateSceneRequest { allow_pairs: vec![subjects("a", "z")], ..update() }, missing, "allow_pairs[0]"),
         (UpdateSceneRequest { forbid_pairs: vec![subjects("a", "a")], ..update() }, invalid, "forbid_pairs[0]"),
         (attach(&[("z", "a")]), missing, "attach[0].object"),
-        (attach(&[("a", "z")]), missing, "attach[0].object"),
-        (attach(&[("a", "a")]), invalid, "attach[0].object"),
+        (attach(&[("a", "z")]), missing, "attach[0].attachment.to"),
+        (attach(&[("b", "a"), ("a", "z")]), missing, "attach[1].attachment.to"),
+        (attach(&[("a", "a")]), invalid, "attach[0].attachment.to"),
+        (attach(&[("a", "two\nlines")]), invalid, "attach[0].attachment.to"),
+        (touching("z"), missing, "attach[0].attachment.touch[1]"),
+        (touching(""), invalid, "attach[0].attachment.touch[1]"),
+        (upsert(held("z", &[])), missing, "upsert_objects[0].attachment.to"),
+        (upsert(held("c", &[])), invalid, "upsert_objects[0].attachment.to"),
+        (upsert(held("a", &["b", "z"])), missing, "upsert_objects[0].attachment.touch[1]"),
         (attach(&[("a", "b"), ("b", "a")]), invalid, "attach"),
         (UpdateSceneRequest { detach: vec!["z".into()], ..update() }, missing, "detach[0]"),
         (

@@ -43,13 +43,38 @@ pub enum List {
     RobotRemovals,
 }
 
-/// An entry of an [`Update`](super::Update): which list, and the position in it from 0.
+/// An entry of an [`Update`](super::Update): which list, the position in it from 0, and which part
+/// of the entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Entry {
     /// The list.
     pub list: List,
     /// Position in the list, from 0.
     pub index: usize,
+    /// Part of the entry.
+    pub part: Part,
+}
+
+/// What an entry of an [`Update`](super::Update) names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// What is changed.
+    Subject,
+    /// What is to hold it.
+    Holder,
+    /// What it may touch while it is held, by the position in that list.
+    Touch(usize),
+}
+
+impl Entry {
+    /// The first part of an entry.
+    pub(crate) fn of(list: List, index: usize) -> Self {
+        Self { list, index, part: Part::Subject }
+    }
+
+    pub(crate) fn part(self, part: Part) -> Self {
+        Self { part, ..self }
+    }
 }
 
 /// Why an update cannot be applied. The scene is as it was.
@@ -101,8 +126,8 @@ pub enum SceneError {
         /// The body.
         id: BodyId,
     },
-    /// A pair needs two objects.
-    #[error("object \"{name}\" is paired with itself; name two objects")]
+    /// A pair, or what is held and what holds it, are two objects.
+    #[error("object \"{name}\" is named on both sides; name two objects")]
     Itself {
         /// Where.
         at: Entry,
@@ -225,11 +250,16 @@ pub enum SceneError {
 
 impl fmt::Display for Entry {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:?}[{}]", self.list, self.index)
+        write!(f, "{:?}[{}]", self.list, self.index)?;
+        match self.part {
+            Part::Subject => Ok(()),
+            Part::Holder => f.write_str(".attachment.to"),
+            Part::Touch(index) => write!(f, ".attachment.touch[{index}]"),
+        }
     }
 }
 
 /// Items of a list with their entries.
 pub(crate) fn entries<T>(list: List, items: impl IntoIterator<Item = T>) -> impl Iterator<Item = (Entry, T)> {
-    items.into_iter().enumerate().map(move |(index, item)| (Entry { list, index }, item))
+    items.into_iter().enumerate().map(move |(index, item)| (Entry::of(list, index), item))
 }

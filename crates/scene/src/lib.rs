@@ -24,7 +24,7 @@ mod structure;
 mod update;
 
 pub use crew::{Crew, Panicked, Question, Stop};
-pub use error::{Entry, List, SceneError};
+pub use error::{Entry, List, Part, SceneError};
 pub use geometry::{Geometry, GeometryFileError, Ladder, LadderError, MAX_RUNGS, NamedCapsule, NamedHalfSpace};
 pub use limits::{MAX_NAME_BYTES, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, MAX_ROBOTS};
 pub use name::{NameError, check_name};

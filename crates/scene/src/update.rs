@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sublevel_core::body::BodyId;
 use sublevel_core::measure::Pose;
 
-use super::error::{Entry, List, SceneError, entries};
+use super::error::{Entry, List, Part, SceneError, entries};
 use super::object::{Attachment, Object, Slot, Subject};
 use super::poses::{compose, relative};
 use super::rules::{SubjectPair, ordered};
@@ -327,10 +327,7 @@ fn follow(structure: &Structure, next: &mut Scene, held: &[Slot]) -> Result<Vec<
 fn attach(structure: &mut Structure, next: &Scene, update: &Update) -> Result<(), SceneError> {
     for (at, attach) in entries(List::Attach, &update.attach) {
         let slot = find_own(structure, at, &attach.name)?;
-        let holder = find(structure, at, &attach.to)?;
-        if slot == holder {
-            return Err(SceneError::Itself { at, name: attach.name.clone() });
-        }
+        let holder = find_holder(structure, at, (&attach.name, &attach.to))?;
         check_touch(structure, at, &attach.touch)?;
         let pose = match attach.pose {
             Some(pose) => pose,
@@ -343,10 +340,7 @@ fn attach(structure: &mut Structure, next: &Scene, update: &Update) -> Result<()
     }
     for (at, placement) in entries(List::Upserts, &update.upserts) {
         if let Some(attachment) = &placement.attachment {
-            find(structure, at, &attachment.to)?;
-            if attachment.to == placement.name {
-                return Err(SceneError::Itself { at, name: placement.name.clone() });
-            }
+            find_holder(structure, at, (&placement.name, &attachment.to))?;
             check_touch(structure, at, &attachment.touch)?;
         }
     }
@@ -385,27 +379,33 @@ fn apply_rules(structure: &mut Structure, update: &Update) -> Result<(), SceneEr
 
 /// A pair of two different objects of the scene, or of groups, in the order it is kept.
 fn checked(structure: &Structure, at: Entry, (a, b): &SubjectPair) -> Result<SubjectPair, SceneError> {
-    check_touch(structure, at, [a, b])?;
+    check_subject(structure, at, a)?;
+    check_subject(structure, at, b)?;
     match (a, b) {
         (Subject::Object(a), Subject::Object(b)) if a == b => Err(SceneError::Itself { at, name: a.clone() }),
         (a, b) => Ok(ordered((a.clone(), b.clone()))),
     }
 }
 
-/// Objects are there, groups have usable names.
-fn check_touch<'a>(
-    structure: &Structure,
-    at: Entry,
-    subjects: impl IntoIterator<Item = &'a Subject>,
-) -> Result<(), SceneError> {
-    for subject in subjects {
-        let (Subject::Object(name) | Subject::Group(name)) = subject;
-        check_name(name).map_err(|error| SceneError::Name { at, error })?;
-        if matches!(subject, Subject::Object(_)) {
-            find(structure, at, name)?;
-        }
+/// What a held object may touch can be named.
+fn check_touch(structure: &Structure, at: Entry, touch: &[Subject]) -> Result<(), SceneError> {
+    let mut subjects = touch.iter().enumerate();
+    subjects.try_for_each(|(index, subject)| check_subject(structure, at.part(Part::Touch(index)), subject))
+}
+
+/// An object is there, a group has a usable name.
+fn check_subject(structure: &Structure, at: Entry, subject: &Subject) -> Result<(), SceneError> {
+    match subject {
+        Subject::Object(name) => find(structure, at, name).map(|_| ()),
+        Subject::Group(name) => check_name(name).map_err(|error| SceneError::Name { at, error }),
     }
-    Ok(())
+}
+
+/// The object that is to hold another one.
+fn find_holder(structure: &Structure, at: Entry, (held, to): (&Arc<str>, &Arc<str>)) -> Result<Slot, SceneError> {
+    let at = at.part(Part::Holder);
+    let holder = find(structure, at, to)?;
+    if held == to { Err(SceneError::Itself { at, name: held.clone() }) } else { Ok(holder) }
 }
 
 /// Nothing is held by itself or by an object that is gone.

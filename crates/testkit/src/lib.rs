@@ -1,5 +1,6 @@
 //! What tests and benches of several crates share: seeded draws, the bodies and the cases of the
-//! stability catalogue as plain data, and references of 200 bits. Not published.
+//! stability catalogue as plain data, references of 200 bits, and intersections of triangles. Not
+//! published.
 
 #![allow(missing_docs, unreachable_pub)]
 
@@ -10,6 +11,7 @@ pub mod random;
 pub mod reference;
 mod solver;
 pub mod sos_bodies;
+pub mod triangles;
 
 pub use data::data;
 pub use random::Seeded;

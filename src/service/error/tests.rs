@@ -22,7 +22,7 @@ fn of_scene(error: SceneError) -> Status {
 /// One refusal of each reason, in the words of the page.
 fn example(reason: Reason) -> Status {
     let (body, robot) = (BODY.parse().expect("an id"), ROBOT.parse().expect("an id"));
-    let at = |list, index| Entry { list, index };
+    let at = |list, index| Entry { list, index, part: Part::Subject };
     match reason {
         Reason::InvalidField => Invalid::new("pairs[0]", "pairs an object with itself; name two").into(),
         Reason::SceneNotFound => catalogue(&CatalogueError::NoScene("nowhere".into()), "scene"),

@@ -71,7 +71,11 @@ async fn whole_motions_are_proven_or_their_first_contact_is_bracketed() {
 
 /// What is said of a path of which nothing is known.
 fn is_blank(motion: &CheckedMotion) -> bool {
-    motion.alpha == 0.0 && motion.clearance_lower_m.is_nan() && motion.contact.is_none() && motion.certificate.is_none()
+    motion.alpha == 0.0
+        && motion.clearance_lower_m.is_nan()
+        && motion.contact.is_none()
+        && motion.open.is_none()
+        && motion.certificate.is_none()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -139,24 +143,68 @@ async fn paths_with_unusable_values_are_invalid_and_no_others() {
     let (_server, client, _clients, robot) = served(dir.path()).await;
     cell(&client, &robot).await;
     let nan = f64::NAN;
-    let paths: [(&[[f64; 2]], StateVerdict); 7] = [
-        (&[[0.0, nan], [-0.5, 0.0]], StateVerdict::Invalid),
-        (&[[0.0, 0.0], [-0.5, 0.0]], StateVerdict::Free),
-        (&[[0.0, 0.0], [nan, 0.0], [-0.5, 0.0]], StateVerdict::Invalid),
-        (&[[0.0, 0.0], [f64::INFINITY, 0.0]], StateVerdict::Invalid),
-        (&[[0.0, 0.0], [-0.5, 0.0], [-2.0000001, 0.0]], StateVerdict::Invalid),
-        (&[[0.0, 0.0], [0.0, 0.2], [-2.0, 0.2]], StateVerdict::Free),
-        (&[[0.0, 0.0], [0.0, -1e-8]], StateVerdict::Invalid),
+    // The configuration that is wrong, counted over all paths, and what the reason says of it.
+    let paths: [(&[[f64; 2]], Option<&[&str]>); 7] = [
+        (&[[0.0, nan], [-0.5, 0.0]], Some(&["joint_values[0]: ", "slide is NaN", "give a finite number"])),
+        (&[[0.0, 0.0], [-0.5, 0.0]], None),
+        (&[[0.0, 0.0], [nan, 0.0], [-0.5, 0.0]], Some(&["joint_values[5]: ", "lift is NaN"])),
+        (&[[0.0, 0.0], [f64::INFINITY, 0.0]], Some(&["joint_values[8]: ", "lift is inf"])),
+        (
+            &[[0.0, 0.0], [-0.5, 0.0], [-2.0000001, 0.0]],
+            Some(&["joint_values[11]: ", "lift is -2.0000001", "limits -2 to 2", "give a value within them"]),
+        ),
+        (&[[0.0, 0.0], [0.0, 0.2], [-2.0, 0.2]], None),
+        (&[[0.0, 0.0], [0.0, -1e-8]], Some(&["joint_values[16]: ", "slide is -0.00000001", "limits 0 to"])),
     ];
     let question = MotionsQuestion::of_robot("one", []);
     let question =
         paths.iter().fold(question, |question, (path, _)| question.with_path(path.iter().map(|point| &point[..])));
     let found = client.check_motions("cell", question).await.expect("answered");
-    for (motion, (path, expected)) in found.motions.iter().zip(paths) {
+    for (motion, (path, why)) in found.motions.iter().zip(paths) {
+        let expected = if why.is_some() { StateVerdict::Invalid } else { StateVerdict::Free };
         assert_eq!(motion.verdict, expected, "{path:?}");
-        assert_eq!(is_blank(motion), expected == StateVerdict::Invalid, "{path:?}: {motion:?}");
+        assert_eq!(is_blank(motion), why.is_some(), "{path:?}: {motion:?}");
+        assert_eq!(motion.reason.is_some(), why.is_some(), "{path:?}: {motion:?}");
+        let reason = motion.reason.as_deref().unwrap_or_default();
+        let [starts, says @ ..] = why.unwrap_or(&[""]) else { panic!("{path:?}") };
+        assert!(reason.starts_with(starts) && says.iter().all(|word| reason.contains(word)), "{path:?}: {reason}");
     }
     assert!(found.complete && found.motions.len() == paths.len());
+    // Without an invalid path there are no reasons.
+    let free = MotionsQuestion::of_robot("one", []).with_edges(&paths[1].0[..]);
+    assert_eq!(client.check_motions("cell", free).await.expect("answered").motions[0].reason, None);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_pair_that_is_open_before_the_first_contact_is_named() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    // What is held moves on a circle with a radius of 1.3 m: half a radian on its way it passes a
+    // ball at 0.2 mm, and at a right angle it meets another one.
+    let thing = client.create_ball("thing", 0.05).await.expect("a ball");
+    let beside = at(1.3 * 0.5_f64.sin(), 0.1002, 0.3 + 1.3 * 0.5_f64.cos());
+    client
+        .put_objects("cell", [("beside", &thing, beside), ("post", &thing, at(1.3, 0.0, 0.3))])
+        .await
+        .expect("placed");
+    let ask = |resolution_m: f64| {
+        let mut question = MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[QUARTER]]);
+        let request = question.request_mut();
+        (request.first_contact, request.resolution_m) = (true, Some(resolution_m));
+        question
+    };
+    let coarse = client.check_motions("cell", ask(0.1)).await.expect("answered");
+    let CheckedMotion { verdict, alpha, contact, open, .. } = coarse.motions[0].clone();
+    let ((pair, s), (open_pair, open_s)) = (contact.expect("a contact"), open.expect("an open pair"));
+    assert_eq!(verdict, StateVerdict::Contact);
+    assert!(pair.contains(&"held".to_owned()) && pair.contains(&"post".to_owned()), "{pair:?}");
+    assert!(open_pair.contains(&"held".to_owned()) && open_pair.contains(&"beside".to_owned()), "{open_pair:?}");
+    assert!(alpha <= open_s && open_s < s && (open_s - 0.5 / QUARTER).abs() < 0.1, "{alpha} {open_s} {s}");
+    let fine = client.check_motions("cell", ask(1e-4)).await.expect("answered");
+    let CheckedMotion { alpha, contact, open, .. } = fine.motions[0].clone();
+    let (pair, s) = contact.expect("a contact");
+    assert!(open.is_none() && pair.contains(&"post".to_owned()) && s - alpha < 1e-3 && alpha > 0.9, "{alpha} {s}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -4,7 +4,7 @@
 use std::future::pending;
 use std::path::Path;
 
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use sublevel::client::{ExplainQuestion, RobotFiles, RobotPlacement, SceneState};
 use sublevel::fit::{ReadOptions, read_mesh};
 use sublevel::robot::motion::{DEFAULT_DERIVE_RESOLUTION_M, DEFAULT_MAX_BOXES, PairClass};
@@ -13,50 +13,9 @@ use sublevel::scene::NamedJointValues;
 use sublevel::scene::query::StateVerdict;
 use sublevel::store::{DeriveRequest, DerivedLinkPair};
 use sublevel_testkit::data;
+use sublevel_testkit::triangles::{Triangle, crossings};
 
 use crate::harness::Running;
-
-type Triangle = [Vector3<f64>; 3];
-
-/// Six times the volume of a tetrahedron below which its sign is not taken as known, m³. Of points
-/// within 2 m rounding is below 1e-14, poses and their joints included.
-const VOLUME: f64 = 1e-12;
-
-/// Six times the signed volume of a tetrahedron, m³.
-fn volume([a, b, c]: &Triangle, d: &Vector3<f64>) -> f64 {
-    (a - d).cross(&(b - d)).dot(&(c - d))
-}
-
-/// Whether the segment is proven to cross the interior of the triangle: its ends lie on both sides,
-/// and the line through them passes all edges on the same side.
-fn crosses(p: &Vector3<f64>, q: &Vector3<f64>, triangle: &Triangle) -> bool {
-    let (above, below) = (volume(triangle, p), volume(triangle, q));
-    if above.abs() <= VOLUME || below.abs() <= VOLUME || (above > 0.0) == (below > 0.0) {
-        return false;
-    }
-    let [a, b, c] = triangle;
-    let around = [[a, b], [b, c], [c, a]].map(|[from, to]| volume(&[*p, *q, *from], to));
-    around.iter().all(|side| *side > VOLUME) || around.iter().all(|side| *side < -VOLUME)
-}
-
-/// Pairs of triangles of two meshes that are proven to intersect.
-fn crossings(a: &[Triangle], b: &[Triangle]) -> usize {
-    let bounds = |triangle: &Triangle| {
-        let [p, q, r] = triangle;
-        (p.inf(&q.inf(r)), p.sup(&q.sup(r)))
-    };
-    let edges = |of: &Triangle, other: &Triangle| (0..3).any(|k| crosses(&of[k], &of[(k + 1) % 3], other));
-    let boxes: Vec<_> = b.iter().map(bounds).collect();
-    let of_one = |one: &Triangle| {
-        let (lower, upper) = bounds(one);
-        let near = b
-            .iter()
-            .zip(&boxes)
-            .filter(|(_, (low, high))| (0..3).all(|axis| lower[axis] <= high[axis] && low[axis] <= upper[axis]));
-        near.filter(|(other, _)| edges(one, other) || edges(other, one)).count()
-    };
-    a.iter().map(of_one).sum()
-}
 
 /// The triangles of a link in the world, from the files alone, where the scene says that the link
 /// is.
@@ -77,18 +36,6 @@ fn triangles(urdf: &Path, scene: &SceneState, link: &str) -> Vec<Triangle> {
         found.extend(mesh.triangles.iter().map(|corners| corners.each_ref().map(place)));
     }
     found
-}
-
-#[test]
-fn crossings_of_triangles_are_counted() {
-    let triangle = |z: f64| [[0.0, 0.0, z], [1.0, 0.0, z], [0.0, 1.0, z]].map(Vector3::from);
-    let through = [[0.2, 0.2, -0.5], [0.2, 0.3, 0.5], [0.3, 0.2, 0.5]].map(Vector3::from);
-    let beside = through.map(|point| point + Vector3::new(0.9, 0.0, 0.0));
-    assert_eq!(crossings(&[triangle(0.0), triangle(2.0)], &[through, beside]), 1);
-    // A large one that a small one pierces with its edges, in either order.
-    let spike = [[0.2, 0.2, -0.1], [0.21, 0.2, -0.1], [0.2, 0.2, 0.1]].map(Vector3::from);
-    assert_eq!((crossings(&[triangle(0.0)], &[spike]), crossings(&[spike], &[triangle(0.0)])), (1, 1));
-    assert_eq!(crossings(&[triangle(0.0)], &[triangle(0.0)]), 0, "what only touches proves nothing");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -148,8 +148,10 @@ async fn updates() {
         (UpdateSceneRequest { detach: vec!["two/arm".into()], ..update() }, invalid, "detach[0]"),
         (attach("two/arm", "two/arm"), invalid, "attach[0].object"),
         (attach("two/arm", "two/hand"), invalid, "attach[0].object"),
-        (attach("post", "post"), invalid, "attach[0].object"),
-        (attach("post", "two/flange"), missing, "attach[0].object"),
+        (attach("post", "post"), invalid, "attach[0].attachment.to"),
+        (attach("post", "two/flange"), missing, "attach[0].attachment.to"),
+        (attach("post", ""), invalid, "attach[0].attachment.to"),
+        (attach("beam", "two/hand"), missing, "attach[0].object"),
         (
             UpdateSceneRequest { set_poses: rows(vec![moved("two/arm", at(0.0))]), ..update() },
             invalid,

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::rows::{LinkRow, MotionRow, StateRow};
+use super::rows::{LinkRow, MeshRow, MotionRow, SrdfRow, StateRow, Tables};
 use crate::csv::{CsvError, Row, Table};
 
 /// Columns of the table of states.
@@ -15,8 +15,14 @@ const MOTIONS: &str = "family,representation,from,length_rad,problems,free,mean_
 /// Columns of the table of links.
 const LINKS: &str = "representation,link,parts,degree,gap_m";
 
-/// Three tables, an empty line between them.
-pub(super) fn written(states: &[StateRow], motions: &[MotionRow], links: &[LinkRow]) -> String {
+/// Columns of the table of states against meshes.
+const MESHES: &str = "representation,states,free,free_self,contacts,missed";
+
+/// Columns of the table of the SRDF.
+const SRDF: &str = "representation,pairs,never,proven,wrong,overlap_m,witness,is_certain,boxes,seconds";
+
+/// The tables, an empty line between them.
+pub(super) fn written(Tables { states, motions, links, meshes, srdf }: &Tables) -> String {
     let mut text = format!("{STATES}\n");
     // Writing to a string cannot fail.
     for row in states {
@@ -52,24 +58,62 @@ pub(super) fn written(states: &[StateRow], motions: &[MotionRow], links: &[LinkR
     for LinkRow { representation, link, parts, degree, gap_m } in links {
         let _ = writeln!(text, "\"{representation}\",{link},{parts},{degree},{}", number(*gap_m));
     }
+    let _ = write!(text, "\n{MESHES}\n");
+    for MeshRow { representation, states, free, free_self, contacts, missed } in meshes {
+        let _ = writeln!(text, "\"{representation}\",{states},{free},{free_self},{contacts},{missed}");
+    }
+    let _ = write!(text, "\n{SRDF}\n");
+    for row in srdf {
+        let SrdfRow { representation, pairs, never, proven, wrong, witness, is_certain, boxes, .. } = row;
+        let (overlap, seconds) = (number(row.overlap_m), number(row.seconds));
+        let _ = writeln!(
+            text,
+            "\"{representation}\",{pairs},{never},{proven},{wrong},{overlap},{witness},{is_certain},{boxes},{seconds}"
+        );
+    }
     text
 }
 
-/// What a CSV holds.
-pub(super) type Tables = (Vec<StateRow>, Vec<MotionRow>, Vec<LinkRow>);
-
-/// Reads what [`written`] wrote; the table of links may be missing.
+/// Reads what [`written`] wrote; the tables after that of motions may be missing.
 pub(super) fn read(csv: &str) -> Result<Tables, CsvError> {
     let mut parts = csv.split("\n\n");
     let mut table = || Table::read(parts.next().unwrap_or_default());
     let (states, motions) = (table()?, table()?);
-    let links = parts.next().map(Table::read).transpose()?;
-    let links = links.iter().flat_map(Table::rows).map(link).collect::<Result<_, _>>()?;
-    Ok((
-        states.rows().map(state).collect::<Result<_, _>>()?,
-        motions.rows().map(motion).collect::<Result<_, _>>()?,
-        links,
-    ))
+    let mut later = || parts.next().map(Table::read).transpose();
+    let (links, meshes, srdf) = (later()?, later()?, later()?);
+    Ok(Tables {
+        states: states.rows().map(state).collect::<Result<_, _>>()?,
+        motions: motions.rows().map(motion).collect::<Result<_, _>>()?,
+        links: links.iter().flat_map(Table::rows).map(link).collect::<Result<_, _>>()?,
+        meshes: meshes.iter().flat_map(Table::rows).map(mesh).collect::<Result<_, _>>()?,
+        srdf: srdf.iter().flat_map(Table::rows).map(of_srdf).collect::<Result<_, _>>()?,
+    })
+}
+
+fn mesh(row: Row<'_>) -> Result<MeshRow, CsvError> {
+    Ok(MeshRow {
+        representation: row.text("representation")?.to_owned(),
+        states: row.get("states")?,
+        free: row.get("free")?,
+        free_self: row.get("free_self")?,
+        contacts: row.get("contacts")?,
+        missed: row.get("missed")?,
+    })
+}
+
+fn of_srdf(row: Row<'_>) -> Result<SrdfRow, CsvError> {
+    Ok(SrdfRow {
+        representation: row.text("representation")?.to_owned(),
+        pairs: row.get("pairs")?,
+        never: row.get("never")?,
+        proven: row.get("proven")?,
+        wrong: row.text("wrong")?.to_owned(),
+        overlap_m: row.number("overlap_m")?,
+        witness: row.text("witness")?.to_owned(),
+        is_certain: row.get("is_certain")?,
+        boxes: row.get("boxes")?,
+        seconds: row.number("seconds")?,
+    })
 }
 
 fn link(row: Row<'_>) -> Result<LinkRow, CsvError> {
@@ -186,11 +230,38 @@ mod tests {
             degree: 6,
             gap_m: 0.0125,
         };
-        let text = written(std::slice::from_ref(&state), std::slice::from_ref(&motion), std::slice::from_ref(&link));
-        // Earlier runs wrote no links.
-        let before = text.rsplit_once("\n\n").expect("three tables").0;
-        assert_eq!(read(before), Ok((vec![state.clone()], vec![motion.clone()], Vec::new())));
-        assert_eq!(read(&text), Ok((vec![state], vec![motion], vec![link])));
+        let mesh = MeshRow {
+            representation: "degree 6".into(),
+            states: 1000,
+            free: 900,
+            free_self: 800,
+            contacts: 90,
+            missed: 1,
+        };
+        let srdf = SrdfRow {
+            representation: "within 2 cm, as by default".into(),
+            pairs: 55,
+            never: 23,
+            proven: 22,
+            wrong: "link2 and link6".into(),
+            overlap_m: 0.0625,
+            witness: "0.0000 1.5000".into(),
+            is_certain: true,
+            boxes: 1 << 33,
+            seconds: 2.5,
+        };
+        let (states, motions, links) = (vec![state], vec![motion], vec![link]);
+        let all = Tables { states, motions, links, meshes: vec![mesh], srdf: vec![srdf] };
+        let text = written(&all);
+        assert_eq!(read(&text), Ok(all.clone()));
+        // Earlier runs wrote fewer tables.
+        let tables: Vec<&str> = text.split("\n\n").collect();
+        let before = |count: usize| read(&tables[..count].join("\n\n"));
+        assert_eq!(before(4), Ok(Tables { srdf: Vec::new(), ..all.clone() }));
+        assert_eq!(before(3), Ok(Tables { meshes: Vec::new(), srdf: Vec::new(), ..all.clone() }));
+        let Tables { states, motions, .. } = all;
+        assert_eq!(before(2), Ok(Tables { states, motions, ..Tables::default() }));
+        assert!(before(1).is_err());
         assert!(read("family\nbox\n").is_err());
     }
 }

@@ -103,7 +103,7 @@ pub(super) fn question(scene: &Scene, states: &[f64]) -> Result<States, Box<dyn 
 }
 
 /// Which of these states are proven free.
-fn free(scene: &Scene, states: &[f64]) -> Result<Vec<bool>, Box<dyn Error>> {
+pub(super) fn free(scene: &Scene, states: &[f64]) -> Result<Vec<bool>, Box<dyn Error>> {
     if states.is_empty() {
         return Ok(Vec::new());
     }

@@ -7,6 +7,7 @@ mod coal;
 mod csv;
 mod decisions;
 mod edges;
+mod meshes;
 mod motions;
 mod pictures;
 mod place;
@@ -15,6 +16,7 @@ mod report;
 mod representation;
 mod rows;
 mod shown;
+mod srdf;
 mod states;
 mod summary;
 
@@ -34,7 +36,7 @@ use motions::Measured;
 pub(crate) use place::Site;
 pub(crate) use problems::{Problem, families, read_problems};
 pub(crate) use representation::{LoadedArm, Representation};
-use rows::{ALL, LinkRow, MotionRow, StateRow};
+use rows::{ALL, MotionRow, StateRow, Tables};
 pub(crate) use shown::Shown;
 
 /// What was measured.
@@ -43,9 +45,7 @@ pub struct Panda {
     quick: bool,
     /// Version of coal, if it took part.
     coal: Option<String>,
-    states: Vec<StateRow>,
-    motions: Vec<MotionRow>,
-    links: Vec<LinkRow>,
+    tables: Tables,
 }
 
 /// How much is measured.
@@ -119,8 +119,17 @@ pub fn panda(
         let of_all: Vec<&Measured> = measured.iter().filter(|measured| measured.links == links).collect();
         motions.extend(motions::rows(ALL, &of_all));
     }
+    announce("meshes of the links")?;
+    let places: Vec<_> = sites.iter().flat_map(|own| (1..).zip(own)).collect();
+    let meshes = meshes::measure(&arm, &arms, &places, (extent.effort.random, machine.cores))?;
+    let mut srdf = Vec::new();
+    for (links, loaded) in arms.iter().filter(|(links, _)| *links == Representation::Default) {
+        announce("pairs of links")?;
+        srdf.push(srdf::measure(&arm, *links, loaded)?);
+    }
     let links = arms.iter().flat_map(|(_, loaded)| loaded.links.iter().cloned()).collect();
-    Ok(Panda { machine, quick, coal: coal.map(|coal| coal.version()), states, motions, links })
+    let tables = Tables { states, motions, links, meshes, srdf };
+    Ok(Panda { machine, quick, coal: coal.map(|coal| coal.version()), tables })
 }
 
 /// Says what is going on, and fails when it is to stop.

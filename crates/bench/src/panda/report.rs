@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::rows::{LinkRow, MotionRow, StateRow};
+use super::rows::{LinkRow, MeshRow, MotionRow, SrdfRow, StateRow, Tables};
 use super::summary::{Figure, summary};
 use super::{Machine, Panda, Representation, csv};
 use crate::blocks::block;
@@ -23,6 +23,7 @@ impl Panda {
         };
         let block = |name: &str| block(CSV, name, "");
         let [summary, states, families, links] = ["summary", "states", "families", "links"].map(block);
+        let [meshes, srdf] = ["meshes", "srdf"].map(block);
         let [motions, proofs, of_families] = ["motions", "proofs", "motions of families"].map(block);
         format!(
             "# A planner's workload\n\n{head}\n\n\
@@ -41,11 +42,19 @@ impl Panda {
              not fill the hull of a link. The last two columns are states with self-collision in batches of 1 000 on all \
              cores, of the first problem of each family.\n\n{states}\n\
              ![time of a state against states kept](panda-states.svg)\n\n\
+             ### Meshes\n\n\
+             The same states anywhere against the meshes of the links, as they are in the files: triangles that are proven to \
+             intersect those of an obstacle (a prism inside a cylinder) or of another link, and corners inside an obstacle. \
+             What a representation proves free of obstacles, or of these and of other links, must have none.\n\n{meshes}\n\
              ### By family\n\nKnown-free states kept, and µs per state among the obstacles.\n\n{families}\n\
              ![time of a state against states kept, family by family](panda-families.svg)\n\n\
              ### Links\n\nConvex parts, their largest degree, and how far they reach at most beyond the hull of the link, or of the \
              part of it that they are fitted to. *{}* is what `sublevel robot` makes where no other gap and no degree are asked \
              for.\n\n{links}\n\
+             ### The SRDF\n\n\
+             Whether each pair of links can touch at all within the joint limits, by branch and bound over the joint values \
+             (`sublevel robot --pairs`), beside what the SRDF says; one core. *Wrong* are pairs that the SRDF leaves out and whose bodies \
+             overlap by more than their gaps, so that the hulls of the links touch.\n\n{srdf}\n\
              ## Motions\n\n\
              Straight edges in joint space towards configurations anywhere, with self-collision; of each problem the first \
              candidate that a representation proves free. A proof holds for the whole edge. Beside it the states that a \
@@ -62,9 +71,9 @@ impl Panda {
         )
     }
 
-    /// Three tables, an empty line between them.
+    /// The tables, an empty line between them.
     pub fn csv(&self) -> String {
-        csv::written(&self.states, &self.motions, &self.links)
+        csv::written(&self.tables)
     }
 
     /// One JSON object with everything; null where something is not measured.
@@ -80,9 +89,11 @@ impl Panda {
             states: &'a [StateRow],
             motions: &'a [MotionRow],
             links: &'a [LinkRow],
+            meshes: &'a [MeshRow],
+            srdf: &'a [SrdfRow],
         }
-        let (states, motions, links) = (&self.states[..], &self.motions[..], &self.links[..]);
-        let summary = summary(states, motions);
-        serde_json::to_string(&All { machine: &self.machine, quick: self.quick, summary, states, motions, links })
+        let Tables { states, motions, links, meshes, srdf } = &self.tables;
+        let (machine, quick, summary) = (&self.machine, self.quick, summary(&self.tables));
+        serde_json::to_string(&All { machine, quick, summary, states, motions, links, meshes, srdf })
     }
 }

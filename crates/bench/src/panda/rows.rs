@@ -10,6 +10,16 @@ pub(super) const ALL: &str = "all";
 /// The representation of rows of coal.
 pub(super) const COAL: &str = "hulls, coal";
 
+/// All that is measured.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Tables {
+    pub(super) states: Vec<StateRow>,
+    pub(super) motions: Vec<MotionRow>,
+    pub(super) links: Vec<LinkRow>,
+    pub(super) meshes: Vec<MeshRow>,
+    pub(super) srdf: Vec<SrdfRow>,
+}
+
 /// What stands for a link.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct LinkRow {
@@ -22,6 +32,41 @@ pub(super) struct LinkRow {
     /// How far a part reaches beyond the hull of what it is fitted to, metres; NaN where that is
     /// not known.
     pub(super) gap_m: f64,
+}
+
+/// States anywhere against the meshes of the links.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct MeshRow {
+    pub(super) representation: String,
+    pub(super) states: usize,
+    /// Of these proven free among the obstacles, and with self-collision.
+    pub(super) free: usize,
+    pub(super) free_self: usize,
+    /// Of the states, those in which meshes meet.
+    pub(super) contacts: usize,
+    /// Of those in which meshes meet, the ones that are called free of what they meet.
+    pub(super) missed: usize,
+}
+
+/// Pairs of links that can touch at all, beside the SRDF.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct SrdfRow {
+    pub(super) representation: String,
+    /// Pairs of links with geometry.
+    pub(super) pairs: usize,
+    /// Pairs that the SRDF marks as never touching, and those of them that are proven.
+    pub(super) never: usize,
+    pub(super) proven: usize,
+    /// A pair that the SRDF leaves out and that touches, and how far its bodies overlap, metres.
+    pub(super) wrong: String,
+    pub(super) overlap_m: f64,
+    /// Joint values at which it does, radians.
+    pub(super) witness: String,
+    /// Whether the hulls of the links do so as well.
+    pub(super) is_certain: bool,
+    /// Boxes of joint values that were looked at.
+    pub(super) boxes: u64,
+    pub(super) seconds: f64,
 }
 
 /// States of the problems of a family. Times are microseconds per state on one thread, medians of

@@ -6,30 +6,25 @@ use sublevel::draw::ChartError;
 
 use super::csv::read;
 use super::pictures::{chart_of_families, chart_of_motions, chart_of_states};
-use super::rows::{ALL, COAL, LinkRow, MotionRow, StateRow};
+use super::rows::{ALL, COAL, LinkRow, MeshRow, MotionRow, SrdfRow, StateRow, Tables};
 use super::summary::{Figure, summary};
 use crate::csv::CsvError;
 
 /// The tables of a CSV.
-pub(crate) struct Shown {
-    states: Vec<StateRow>,
-    motions: Vec<MotionRow>,
-    links: Vec<LinkRow>,
-}
+pub(crate) struct Shown(Tables);
 
 impl Shown {
     /// Reads what [`Panda::csv`](super::Panda::csv) wrote.
     pub(crate) fn read(csv: &str) -> Result<Self, CsvError> {
-        let (states, motions, links) = read(csv)?;
-        Ok(Self { states, motions, links })
+        read(csv).map(Self)
     }
 
     /// The pictures by name.
     pub(crate) fn pictures(&self) -> Result<Vec<(String, String)>, ChartError> {
         Ok(vec![
-            ("panda-states.svg".into(), chart_of_states(&self.states)?),
-            ("panda-families.svg".into(), chart_of_families(&self.states, &self.families())?),
-            ("panda-motions.svg".into(), chart_of_motions(&self.states, &self.motions)?),
+            ("panda-states.svg".into(), chart_of_states(&self.0.states)?),
+            ("panda-families.svg".into(), chart_of_families(&self.0.states, &self.families())?),
+            ("panda-motions.svg".into(), chart_of_motions(&self.0.states, &self.0.motions)?),
         ])
     }
 
@@ -40,6 +35,8 @@ impl Shown {
             "states" => Some(self.table_of_states()),
             "families" => Some(self.table_of_families()),
             "links" => Some(self.table_of_links()),
+            "meshes" => Some(self.table_of_meshes()),
+            "srdf" => Some(self.table_of_srdf()),
             "motions" => Some(self.table_of_motions()),
             "proofs" => Some(self.table_of_proofs()),
             "motions of families" => Some(self.table_of_motion_families()),
@@ -49,7 +46,7 @@ impl Shown {
 
     fn summary(&self) -> String {
         let mut text = String::from("| figure | value |\n|---|---|\n");
-        for Figure { what, value, unit } in summary(&self.states, &self.motions) {
+        for Figure { what, value, unit } in summary(&self.0) {
             // Writing to a string cannot fail.
             let _ = writeln!(text, "| {what} | {} |", unit.text(value));
         }
@@ -57,7 +54,7 @@ impl Shown {
     }
 
     fn states_of(&self, family: &str) -> impl Iterator<Item = &StateRow> {
-        self.states.iter().filter(move |row| row.family == family)
+        self.0.states.iter().filter(move |row| row.family == family)
     }
 
     fn table_of_states(&self) -> String {
@@ -114,7 +111,7 @@ impl Shown {
     /// Parts, degree and gap of each link, a column for each representation.
     fn table_of_links(&self) -> String {
         let (mut representations, mut links): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
-        for row in &self.links {
+        for row in &self.0.links {
             for (known, name) in [(&mut representations, &row.representation), (&mut links, &row.link)] {
                 if !known.contains(&name.as_str()) {
                     known.push(name);
@@ -125,7 +122,7 @@ impl Shown {
         let mut text = format!("| link | {heads} |\n|---|{}\n", "---|".repeat(representations.len()));
         for link in links {
             let cell = |name: &&str| {
-                let found = self.links.iter().find(|row| row.representation == **name && row.link == link);
+                let found = self.0.links.iter().find(|row| row.representation == **name && row.link == link);
                 let Some(LinkRow { parts, degree, gap_m, .. }) = found else { return "-".into() };
                 let parts = if *parts == 1 { String::new() } else { format!("{parts} of ") };
                 let gap = if gap_m.is_nan() { "unknown".into() } else { format!("{:.1} mm", 1e3 * gap_m) };
@@ -137,10 +134,38 @@ impl Shown {
         text
     }
 
+    fn table_of_meshes(&self) -> String {
+        let mut text = String::from(
+            "| links as | states anywhere | proven free | with self-collision | meshes meet | of these called free |\n\
+             |---|---|---|---|---|---|\n",
+        );
+        for MeshRow { representation, states, free, free_self, contacts, missed } in &self.0.meshes {
+            let _ = writeln!(text, "| {representation} | {states} | {free} | {free_self} | {contacts} | {missed} |");
+        }
+        text
+    }
+
+    fn table_of_srdf(&self) -> String {
+        let mut text = String::from(
+            "| links as | pairs of links | Never, says the SRDF | of these proven | of these wrong | overlap | at rad | boxes | s |\n\
+             |---|---|---|---|---|---|---|---|---|\n",
+        );
+        for SrdfRow { representation, pairs, never, proven, wrong, overlap_m, witness, boxes, seconds, .. } in
+            &self.0.srdf
+        {
+            let _ = writeln!(
+                text,
+                "| {representation} | {pairs} | {never} | {proven} | {wrong} | {:.1} mm | {witness} | {boxes} | {seconds:.1} |",
+                1e3 * overlap_m
+            );
+        }
+        text
+    }
+
     /// Names of the families in their order.
     fn families(&self) -> Vec<&str> {
         let mut families: Vec<&str> = Vec::new();
-        for row in &self.states {
+        for row in &self.0.states {
             if row.family != ALL && !families.contains(&row.family.as_str()) {
                 families.push(&row.family);
             }
@@ -153,7 +178,7 @@ impl Shown {
             "| links as | edges from | rad | free edges | proof µs per rad | sampled at 1/32 rad µs per rad | proof of sampled | \
              coal, 32 states per rad µs per rad | proof of coal |\n|---|---|---|---|---|---|---|---|---|\n",
         );
-        for row in self.motions.iter().filter(|row| row.family == ALL) {
+        for row in self.0.motions.iter().filter(|row| row.family == ALL) {
             let per_rad = |us: f64| time(us / row.length_rad);
             let _ = writeln!(
                 text,
@@ -179,7 +204,7 @@ impl Shown {
              in checks of samples | mean configurations | with certificate, of the proof | verification, of the proof | samples | in contact |\n\
              |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
         );
-        for row in self.motions.iter().filter(|row| row.family == ALL) {
+        for row in self.0.motions.iter().filter(|row| row.family == ALL) {
             let own = self.states_of(ALL).find(|own| own.representation == row.representation);
             let state_us = own.map_or(f64::NAN, |own| own.self_us);
             let _ = writeln!(
@@ -212,12 +237,12 @@ impl Shown {
             families.join(" | "),
             "---|".repeat(families.len())
         );
-        for row in self.motions.iter().filter(|row| row.family == ALL) {
+        for row in self.0.motions.iter().filter(|row| row.family == ALL) {
             let is_same = |own: &&MotionRow| {
                 own.representation == row.representation && own.from == row.from && own.length_rad == row.length_rad
             };
             let cell = |family: &&str| {
-                let found = self.motions.iter().filter(|own| own.family == *family).find(is_same);
+                let found = self.0.motions.iter().filter(|own| own.family == *family).find(is_same);
                 found.map_or("-".into(), |own| time(own.us_per_rad()))
             };
             let cells: Vec<String> = families.iter().map(cell).collect();

@@ -2,7 +2,7 @@
 
 use super::edges::KINDS;
 use super::representation::Representation;
-use super::rows::{ALL, COAL, MotionRow, StateRow};
+use super::rows::{ALL, COAL, MotionRow, StateRow, Tables};
 
 /// A figure.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -43,7 +43,7 @@ impl Unit {
 }
 
 /// The figures over all families.
-pub(super) fn summary(states: &[StateRow], motions: &[MotionRow]) -> Vec<Figure> {
+pub(super) fn summary(Tables { states, motions, meshes, srdf, .. }: &Tables) -> Vec<Figure> {
     let row = |name: &str| states.iter().find(|row| row.family == ALL && row.representation == name);
     let of = |name: &str, value: fn(&StateRow) -> f64| row(name).map_or(f64::NAN, value);
     let (main, coal) = (MAIN.name(), row(COAL));
@@ -68,6 +68,15 @@ pub(super) fn summary(states: &[StateRow], motions: &[MotionRow]) -> Vec<Figure>
         );
     }
     add(format!("states anywhere that {main} calls free and coal's hulls in contact"), contacts, Unit::Count);
+    if let Some(row) = meshes.iter().find(|row| row.representation == main) {
+        let what = format!("of {} states anywhere, those that {main} calls free and in which meshes meet", row.states);
+        add(what, row.missed as f64, Unit::Count);
+    }
+    for row in srdf {
+        let what = format!("of the {} pairs that the SRDF says never touch, proven", row.never);
+        add(what, row.proven as f64, Unit::Count);
+        add("time of all pairs, s".into(), row.seconds, Unit::Ratio);
+    }
     add(
         format!("state among obstacles, {main}, kinematics included, of coal with cached guesses"),
         of(main, |row| row.scene_us) / of_coal(|row| row.scene_us),
@@ -144,7 +153,7 @@ mod tests {
 
     #[test]
     fn figures_that_were_not_measured_say_so() {
-        let figures = summary(&[], &[]);
+        let figures = summary(&Tables::default());
         let unmeasured = figures.iter().filter(|figure| figure.unit.text(figure.value) == "not measured");
         assert!(unmeasured.count() > 10);
         assert_eq!([Unit::Share.text(0.998), Unit::Count.text(3.0)], ["99.80 %", "3"]);

@@ -32,7 +32,7 @@ pub enum ConfigurationError {
         value: f64,
     },
     /// A value beyond the limits.
-    #[error("joint {joint} is {value}, outside its limits {lower} to {upper}")]
+    #[error("joint {joint} is {value}, outside its limits {lower} to {upper}; give a value within them")]
     Limits {
         /// Name of the joint.
         joint: Arc<str>,

@@ -46,6 +46,10 @@ pub struct MotionAnswer {
     /// Of a contact, the first one that was seen in the order of the path; of a motion that is
     /// undecided the first pair that is open. The first contact lies between `alpha` and its `s`.
     pub contact: Option<MotionContact>,
+    /// Of a contact, the first pair before it that stays open where no point moves by more than the
+    /// resolution: it passes so close to its threshold that `alpha` ends there, maybe well before
+    /// the contact. None where the contact is bracketed to the resolution.
+    pub open: Option<MotionContact>,
     /// Whether the search ended because of a limit or the stop flag before all was decided.
     pub ended_early: bool,
     /// Configurations that were looked at.

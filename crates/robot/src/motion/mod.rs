@@ -23,6 +23,7 @@ mod placing;
 mod planes;
 mod problem;
 mod prove;
+mod screw;
 mod solve;
 #[cfg(test)]
 mod tests;

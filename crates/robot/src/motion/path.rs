@@ -1,9 +1,9 @@
 //! Motions of a robot: curves of configurations.
 
 use super::interval::Interval;
+use super::screw::Screw;
 use crate::description::JointKind;
 use crate::kinematics::Kinematics;
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Most configurations of a path.
@@ -14,9 +14,10 @@ pub const MAX_CONTROL_POINTS: usize = 16;
 
 /// A curve of configurations over the path parameter s in [0, 1].
 ///
-/// Between waypoints joint values are straight lines; floating joints move their origin along a
-/// line while they turn at a constant rate by the smaller angle. With n segments, segment k is the
-/// part `k / n <= s <= (k + 1) / n`.
+/// Between waypoints joint values are straight lines, those of planar joints too: their two
+/// coordinates and their angle. Floating joints go from pose to pose as a screw: at a constant rate
+/// about a line and along it, by the smaller angle. With n segments, segment k is the part `k / n <=
+/// s <= (k + 1) / n`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Path {
@@ -140,10 +141,8 @@ impl Path {
         let (from, to) = (self.point(segment), self.point(segment + 1));
         configuration.extend(from.iter().zip(to).map(|(a, b)| a + (b - a) * t));
         for variable in kinematics.variables().iter().filter(|variable| variable.kind == JointKind::Floating) {
-            let place = variable.first + 3..variable.first + 7;
-            let [a, b] = [from, to].map(|point| quaternion(&point[place.clone()]));
-            let turned = a * UnitQuaternion::from_scaled_axis(turn(&a, &b) * t);
-            configuration[place].copy_from_slice(turned.coords.as_slice());
+            let own = variable.first..variable.first + 7;
+            Screw::new(&from[own.clone()], &to[own.clone()]).write_at(t, &mut configuration[own]);
         }
     }
 
@@ -195,12 +194,10 @@ impl Path {
             (b - a).abs() * half * (1.0 + PATH_ROUNDING) + slack
         }));
         for variable in kinematics.variables().iter().filter(|variable| variable.kind == JointKind::Floating) {
-            let first = variable.first;
-            let shift = Vector3::from_column_slice(&deviations[first..first + 3]).norm();
-            let [a, b] = [from, to].map(|point| quaternion(&point[first + 3..first + 7]));
-            deviations[first..first + 7].fill(0.0);
-            deviations[first] = shift * (1.0 + PATH_ROUNDING);
-            deviations[first + 3] = turn(&a, &b).norm() * half + 4.0 * PATH_ROUNDING;
+            let own = variable.first..variable.first + 7;
+            let (shift, turned) = Screw::new(&from[own.clone()], &to[own.clone()]).deviations(half);
+            deviations[own.clone()].fill(0.0);
+            (deviations[own.start], deviations[own.start + 3]) = (shift, turned);
         }
     }
 }
@@ -208,13 +205,3 @@ impl Path {
 /// Bound of the rounding of a value along a path, relative to the values at its ends; three
 /// roundings a step of interpolation.
 const PATH_ROUNDING: f64 = 8.0 * f64::EPSILON;
-
-fn quaternion(numbers: &[f64]) -> UnitQuaternion<f64> {
-    UnitQuaternion::new_normalize(Quaternion::new(numbers[3], numbers[0], numbers[1], numbers[2]))
-}
-
-/// The smaller turn from one orientation to another, as a vector in the frame of the first;
-/// radians.
-fn turn(from: &UnitQuaternion<f64>, to: &UnitQuaternion<f64>) -> Vector3<f64> {
-    (from.inverse() * to).scaled_axis()
-}

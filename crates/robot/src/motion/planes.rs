@@ -48,15 +48,15 @@ pub(crate) fn top(piece: &Piece<'_>, pose: &Pose, n: &Vector3<f64>, height: Heig
         };
     }
     let (center, radius) = piece.ball();
-    let own = pose.rotation().inverse_transform_vector(n);
+    let own = || pose.rotation().inverse_transform_vector(n);
     let (from, height) = match (piece, height) {
-        (Piece::Body(body), Height::Table) => (*body.interior_point(), body.height(&own)),
+        (Piece::Body(body), Height::Table) => (*body.interior_point(), body.height(&own())),
         (Piece::Body(body), Height::Tangent(tangent)) => {
             let multipliers = tangent.multipliers.iter().copied();
-            (*body.interior_point(), body.tangent_height(&own, &tangent.point.into(), multipliers))
+            (*body.interior_point(), body.tangent_height(&own(), &tangent.point.into(), multipliers))
         }
         (Piece::Capsule(capsule), Height::Table | Height::Tangent(_)) => {
-            (center, capsule.radius_m() + capsule.half_height_m() * own.z.abs())
+            (center, capsule.radius_m() + capsule.half_height_m() * own().z.abs())
         }
         _ => (center, radius),
     };

@@ -413,7 +413,8 @@ impl Search<'_, '_> {
             return true;
         }
         let record = Record { interval: pair.interval, pair: pair.index, normal: (*n).into(), proof: proof() };
-        let holds = record.lower_m(self.problem, &mut self.workspace.placing) > pair.pair.threshold_m;
+        let is_apart = |lower: f64| lower > pair.pair.threshold_m;
+        let holds = is_apart(record.lower_m(self.problem, &mut self.workspace.placing, is_apart));
         if holds {
             self.records.push(record);
         }
@@ -445,13 +446,19 @@ impl Search<'_, '_> {
             (None, false) => MotionVerdict::Free,
         };
         let alpha = contact.as_ref().map_or(self.alpha, |contact| self.alpha.min(contact.s));
+        let open = self.open.take();
+        let (contact, open) = match contact {
+            Some(contact) => (Some(contact.clone()), open.filter(|open| open.s < contact.s)),
+            None => (open, None),
+        };
         let is_certified = self.options.certificate && verdict == MotionVerdict::Free;
         let records = std::mem::take(&mut self.records);
         MotionAnswer {
             verdict,
             alpha,
             clearance_lower_m: self.clearance,
-            contact: contact.or_else(|| self.open.take()),
+            contact,
+            open,
             ended_early,
             configurations: self.configurations,
             solved: self.solved,

@@ -11,6 +11,8 @@ use sublevel_core::measure::{Capsule, HalfSpace, Options, Pose, WarmStart};
 use sublevel_testkit::Seeded;
 use sublevel_testkit::random::at;
 
+mod free_joints;
+
 use super::placing::Placing;
 use super::solve::solve;
 use super::*;
@@ -120,6 +122,42 @@ fn first_contacts_of_a_turning_ball_are_where_they_must_be() {
         );
         assert!(free.clearance_lower_m >= margin);
     }
+}
+
+#[test]
+fn a_near_miss_before_the_first_contact_is_told() {
+    // The hand passes one ball at 20 µm, 0.5 rad on its way, and meets another at 90 degrees.
+    let miss = 2.3 + 2e-5;
+    let posts = vec![
+        still("near", ball(0.2), at(miss * 0.5_f64.cos(), miss * 0.5_f64.sin(), 0.0)),
+        still("post", ball(0.2), at(0.0, 2.0, 0.0)),
+    ];
+    let problem = problem(hand(ball(0.1)), posts, 0.0);
+    let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
+    let expected = (std::f64::consts::FRAC_PI_2 - 2.0 * (0.3_f64 / 4.0).asin()) / 3.0;
+    // Along the normal the hand moves by a second order only: much less than the resolution.
+    let coarse = prove(&problem, &path, &MotionOptions { resolution_m: 0.05, ..FIRST });
+    assert_eq!(coarse.verdict, MotionVerdict::Contact);
+    let (contact, open) = (coarse.contact.expect("a contact"), coarse.open.expect("an open pair"));
+    assert_eq!(contact.items[1], MotionItem::Obstacle(1));
+    assert!(expected <= contact.s && contact.s - expected < 0.02, "{} {expected}", contact.s);
+    assert_eq!(open.items[1], MotionItem::Obstacle(0));
+    assert!(coarse.alpha <= open.s && (open.s - 0.5 / 3.0).abs() < 0.02 && open.s - coarse.alpha < 0.02, "{open:?}");
+    assert!(open.lower_m > 0.0 && open.upper_m < 0.01, "{open:?}");
+    // A finer resolution decides it, and the bracket closes.
+    let fine = prove(&problem, &path, &FIRST);
+    let contact = fine.contact.expect("a contact");
+    assert!(
+        fine.open.is_none() && fine.alpha <= expected && contact.s - fine.alpha < 1e-5,
+        "{} {}",
+        fine.alpha,
+        contact.s
+    );
+    // Without a contact it is the open pair that is told, as before.
+    let short = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 1.0, 0.0]);
+    let passing = prove(&problem, &short, &MotionOptions { resolution_m: 0.05, ..FIRST });
+    assert_eq!((passing.verdict, passing.open), (MotionVerdict::Undecided, None));
+    assert_eq!(passing.contact.expect("an open pair").items[1], MotionItem::Obstacle(0));
 }
 
 #[test]

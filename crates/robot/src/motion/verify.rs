@@ -1,7 +1,7 @@
 //! Checks certificates: forward kinematics, support heights, bounds of motion, and that the
 //! intervals cover the path. Nothing is searched for and nothing is solved.
 
-use super::certificate::{Certificate, Record};
+use super::certificate::Certificate;
 use super::certificate_error::CertificateError;
 use super::interval::Interval;
 use super::placing::Placing;
@@ -91,7 +91,9 @@ impl Certificate {
                 at = Some(record.interval);
                 configurations += 1;
             }
-            let lower_m = record.lower_m(problem, &mut placing);
+            // What is farther apart than another pair changes nothing.
+            let is_enough = |lower_m: f64| lower_m > pair.threshold_m && lower_m - pair.padding_m >= clearance_lower_m;
+            let lower_m = record.lower_m(problem, &mut placing, is_enough);
             if !(lower_m > pair.threshold_m) {
                 return Err(CertificateError::Record { record: index, lower_m, threshold_m: pair.threshold_m });
             }
@@ -101,22 +103,28 @@ impl Certificate {
         Ok(VerifiedMotion { clearance_lower_m, pairs: problem.pairs.len(), configurations })
     }
 
-    /// Every pair has intervals that cover all segments.
+    /// Every pair has intervals that cover all segments. The records name pairs that are there.
     fn check_cover(&self, problem: &MotionProblem) -> Result<(), CertificateError> {
-        let mut records: Vec<&Record> = self.records.iter().collect();
-        records.sort_by(|a, b| {
-            (a.pair, a.interval.segment)
-                .cmp(&(b.pair, b.interval.segment))
-                .then_with(|| a.interval.start().total_cmp(&b.interval.start()))
-        });
-        let mut rest = records.as_slice();
-        for (index, pair) in (0..).zip(&problem.pairs) {
+        // Intervals pair by pair: where those of each begin is counted first.
+        let mut firsts = vec![0; problem.pairs.len() + 1];
+        self.records.iter().for_each(|record| firsts[record.pair as usize + 1] += 1);
+        (1..firsts.len()).for_each(|index| firsts[index] += firsts[index - 1]);
+        let mut intervals = vec![Interval::whole(0); self.records.len()];
+        let mut ends = firsts.clone();
+        for record in &self.records {
+            let end = &mut ends[record.pair as usize];
+            intervals[*end] = record.interval;
+            *end += 1;
+        }
+        for (pair, first) in problem.pairs.iter().zip(firsts.windows(2)) {
+            let own = &mut intervals[first[0]..first[1]];
+            own.sort_unstable_by(|a, b| a.segment.cmp(&b.segment).then_with(|| a.start().total_cmp(&b.start())));
+            let mut rest = &own[..];
             for segment in 0..self.path.segments() {
-                let is_here = |record: &&Record| record.pair == index && record.interval.segment as usize == segment;
-                let count = rest.iter().take_while(|record| is_here(record)).count();
+                let count = rest.iter().take_while(|interval| interval.segment as usize == segment).count();
                 let (here, after) = rest.split_at(count);
                 rest = after;
-                if !covers(here.iter().map(|record| record.interval)) {
+                if !covers(here) {
                     let [a, b] = problem.items(pair).map(|item| problem.name(item).to_string());
                     return Err(CertificateError::Gap { a, b, segment });
                 }
@@ -127,7 +135,7 @@ impl Certificate {
 }
 
 /// Whether intervals, in the order of their starts, cover [0, 1] of their segment.
-fn covers(intervals: impl Iterator<Item = Interval>) -> bool {
+fn covers(intervals: &[Interval]) -> bool {
     let mut end = 0.0;
     for interval in intervals {
         if interval.start() > end {

@@ -1,5 +1,6 @@
 //! Tests of the readers, and the robots that they read.
 
+mod free_joints;
 mod joint_errors;
 mod mesh_paths;
 mod mutations;

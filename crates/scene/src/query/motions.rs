@@ -290,6 +290,11 @@ impl RobotMotions {
         &self.scene
     }
 
+    /// The paths, in their order.
+    pub fn paths(&self) -> &[Path] {
+        &self.paths
+    }
+
     /// Checks a certificate against this robot and scene as they are.
     ///
     /// # Errors

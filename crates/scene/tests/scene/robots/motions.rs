@@ -10,9 +10,9 @@ use sublevel_scene::query::{
     JointValues, MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError,
     StateVerdict, States,
 };
-use sublevel_scene::{Attachment, Crew, Geometry, NamedHalfSpace, Placement, Scene, Subject, Update};
+use sublevel_scene::{Attachment, Crew, Geometry, NamedHalfSpace, Placement, Question, Scene, Stop, Subject, Update};
 use sublevel_testkit::Seeded;
-use sublevel_testkit::random::at;
+use sublevel_testkit::random::{at, replayed, seeds};
 
 use super::{applied, cell, place, robot_with, set, slot, things, values};
 use crate::worlds::placement;
@@ -81,12 +81,11 @@ fn moved([from, to]: &[Pose; 2], s: f64) -> Pose {
 
 /// What the states of a path are at some of its parameters, one by one.
 fn sampled(scene: &Scene, terms: &Terms, way: &Way, places: &[f64]) -> Vec<StateVerdict> {
-    let crew = Crew::new(2).expect("threads");
     let of = |scene: Scene, values: Vec<f64>| {
         let joints = JointValues { robot: "arm", joints: &[], values };
         let states = States::of_joints(scene, joints, terms.margin_m, terms.include_allowed).expect("states");
-        let answers = crew.ask(Arc::new(states), Arc::default()).expect("answered").concat();
-        answers.iter().map(|answer| answer.verdict).collect::<Vec<_>>()
+        let answers = (0..states.chunks()).flat_map(|chunk| states.solve(chunk, &Stop::default()));
+        answers.map(|answer| answer.verdict).collect::<Vec<_>>()
     };
     let Some((name, poses)) = &terms.moving else {
         return of(scene.clone(), places.iter().flat_map(|&s| along(way, s)).collect());
@@ -98,11 +97,15 @@ fn sampled(scene: &Scene, terms: &Terms, way: &Way, places: &[f64]) -> Vec<State
     places.iter().flat_map(at_place).collect()
 }
 
+/// States of a path that are looked at. More take longer than a test may, fewer see less of what is
+/// in contact for a short while.
+const SAMPLES: u32 = 600;
+
 /// Checks an answer against samples: free is free everywhere, a contact is one where it was seen,
 /// and before the part that is proven free ends there is none.
 fn agrees(name: &str, scene: &Scene, terms: &Terms, way: &Way) -> MotionVerdict {
     let answer = checked(scene, terms, way);
-    let places: Vec<f64> = (0..=120).map(|sample| f64::from(sample) / 120.0).collect();
+    let places: Vec<f64> = (0..=SAMPLES).map(|sample| f64::from(sample) / f64::from(SAMPLES)).collect();
     let states = sampled(scene, terms, way, &places);
     for (s, state) in places.iter().zip(&states) {
         let is_proven = answer.alpha > 0.0 && *s <= answer.alpha;
@@ -169,7 +172,9 @@ const CASES: [&str; 7] = ["plain", "padding", "margin", "allowed", "allowed pair
 fn motions_are_what_their_states_are() {
     let group = || Subject::Group("arm".into());
     let mut tally = [[0; 2]; CASES.len()];
-    for seed in 0..140 {
+    let seeds = seeds(0, 140, &[]);
+    println!("seeds {:?} to {:?}, 4 paths of {SAMPLES} samples each", seeds.first(), seeds.last());
+    for seed in seeds {
         let mut random = Seeded(seed);
         let case = seed as usize % CASES.len();
         let mut scene = clutter(&mut random);
@@ -212,7 +217,7 @@ fn motions_are_what_their_states_are() {
         }
     }
     println!("{tally:?}");
-    for (case, [contacts, free]) in CASES.iter().zip(tally) {
+    for (case, [contacts, free]) in CASES.iter().zip(tally).filter(|_| !replayed()) {
         assert!(contacts > 5 && free > 5, "{case}: {contacts} contacts, {free} free");
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use sublevel_core::measure::HalfSpace;
 use sublevel_robot::{Semantics, read_urdf};
 use sublevel_scene::{
-    Attach, Entry, Geometry, JointsError, List, NamedHalfSpace, Robot, RobotError, RobotId, SceneError, Update,
+    Attach, Entry, Geometry, JointsError, List, NamedHalfSpace, Part, Robot, RobotError, RobotId, SceneError, Update,
 };
 use sublevel_testkit::random::at;
 
@@ -21,7 +21,11 @@ fn refused(update: Update) -> SceneError {
 }
 
 fn entry(list: List) -> Entry {
-    Entry { list, index: 0 }
+    Entry { list, index: 0, part: Part::Subject }
+}
+
+fn held_by(list: List) -> Entry {
+    Entry { part: Part::Holder, ..entry(list) }
 }
 
 #[test]
@@ -57,14 +61,15 @@ fn nothing_is_held_by_itself() {
         Update { attach: vec![attach], ..Update::default() }
     };
     for name in ["ball", "tool"] {
-        let itself = SceneError::Itself { at: entry(List::Attach), name: name.into() };
+        let itself = SceneError::Itself { at: held_by(List::Attach), name: name.into() };
         assert_eq!(refused(attach(name, name)), itself);
     }
     let mut both = attach("ball", "tool");
     both.attach.extend(attach("tool", "ball").attach);
     assert!(matches!(refused(both), SceneError::Circle { .. }));
     let missing = refused(attach("ball", "arm/knee"));
-    assert_eq!(missing, SceneError::NoObject { at: entry(List::Attach), name: "arm/knee".into() });
+    assert_eq!(missing, SceneError::NoObject { at: held_by(List::Attach), name: "arm/knee".into() });
+    assert_eq!(held_by(List::Attach).to_string(), "Attach[0].attachment.to");
 }
 
 #[test]
@@ -79,7 +84,7 @@ fn names_are_checked() {
     let twice = Update { robots: vec![place("arm", &arm, base)], ..set("arm", values(&[], &[0.0; 4])) };
     assert_eq!(refused(twice), SceneError::RobotTwice { at: entry(List::Joints), name: "arm".into() });
     let twice = Update { bases: vec![("arm".into(), base); 2], ..Update::default() };
-    assert!(matches!(refused(twice), SceneError::RobotTwice { at: Entry { list: List::Bases, index: 1 }, .. }));
+    assert!(matches!(refused(twice), SceneError::RobotTwice { at: Entry { list: List::Bases, index: 1, .. }, .. }));
     let [ball, _] = things();
     let taken = Update {
         upserts: vec![placement("leg/fore", &ball, base)],
