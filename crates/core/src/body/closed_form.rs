@@ -202,6 +202,15 @@ impl ClosedForm {
         self.center + self.axes.map_or(farthest, |axes| axes * farthest)
     }
 
+    /// Radius of the ball about its centre that contains the shape, metres, but for rounding.
+    pub(crate) fn reach_m(&self) -> f64 {
+        match self.shape {
+            ExactShape::Cuboid { half_extents_m, .. } => Vector3::from(half_extents_m).norm(),
+            ExactShape::Cylinder { radius_m, half_height_m, .. } => radius_m.hypot(half_height_m),
+            ExactShape::Capsule { radius_m, half_length_m } => radius_m + half_length_m,
+        }
+    }
+
     /// Bound of how far a point of the body is from the shape, or one of the shape from the body,
     /// metres.
     #[inline(always)]

@@ -339,7 +339,7 @@ impl Problem<'_> {
 
     /// What is known by the way from a place on the axis, whose middle is at `center`, to the body's
     /// interior point.
-    fn to_interior_point(
+    fn towards_interior(
         &self,
         (body, pose): At<'_, Body>,
         (center, at): (&Vector3<f64>, f64),
@@ -373,7 +373,7 @@ impl Problem<'_> {
         let mut ends: [Option<Tangent>; 2] = [None, None];
         let (mut lower, mut iterations) = (f64::NEG_INFINITY, spent);
         let mut at = axis.dot(&(pose.transform_point(body.interior_point()) - center)).clamp(-half, half);
-        let mut best = self.to_interior_point((body, &pose), (&center, at), spent);
+        let mut best = self.towards_interior((body, &pose), (&center, at), spent);
         // How much the distance falls along the axis where it is the best.
         let (mut slant, mut more) = (f64::INFINITY, 0);
         for _ in 0..if runs(Stage::AlongAxis) { MAX_PLACES } else { 0 } {
