@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use sublevel_core::body::{Shape, Solid};
+use sublevel_core::body::Shape;
 use sublevel_core::measure::{
     Capsule, Decision, Options, Pose, capsules_nearer_than, nearer_than, nearer_to_capsule_than, overlap,
     overlap_of_capsules, overlap_with_capsule, signed_distance,

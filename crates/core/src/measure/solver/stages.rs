@@ -78,7 +78,7 @@ pub enum Stage {
 #[cfg(any(test, feature = "ablation"))]
 impl Stage {
     /// All of them, parts of stages last.
-    pub const ALL: [Self; 34] = [
+    pub const ALL: [Self; 32] = [
         Self::ClosedForm,
         Self::Follow,
         Self::Seek,
@@ -98,8 +98,6 @@ impl Stage {
         Self::DirectionSampling,
         Self::CompassSearch,
         Self::SupportLanes,
-        Self::SupportNewton,
-        Self::SupportInterior,
         Self::AlongAxis,
         Self::ProjectionSteps,
         Self::ProjectionInterior,

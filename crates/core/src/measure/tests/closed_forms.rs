@@ -67,10 +67,10 @@ fn ray(random: &mut Seeded, body: &Body, pose: &Pose, seed: u64) -> Ray {
         1 => pose.transform_direction(&Vector3::ith((seed % 3) as usize, -1.0)) + random.unit() * 1e-16,
         _ => random.unit(),
     };
-    if seed % 5 == 0 {
+    if seed.is_multiple_of(5) {
         direction = (pose.transform_point(form.center()) - target + random.unit() * (1e-3 * ball.radius)).normalize();
     }
-    let length = if seed % 11 == 0 { away } else { f64::INFINITY };
+    let length = if seed.is_multiple_of(11) { away } else { f64::INFINITY };
     Ray::new(target - direction * away, direction, length).unwrap()
 }
 
@@ -224,7 +224,7 @@ fn pair(seed: u64, random: &mut Seeded) -> (Body, Body, Pose, Pose) {
     let to_center = turned.transform_direction(b.closed_form().unwrap().center());
     let at = |distance: f64, way: &Vector3<f64>| turned.with_translation(from - to_center + way * distance);
     let way = random.unit();
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         let far = random.positive() * (size_a + size_b);
         return (a, b, pose_a, at(far, &way));
     }
