@@ -238,7 +238,7 @@ impl Site<'_> {
             tally.check(check, passed, (self.block, self.query), || self.tell(answer));
         };
         check(Check::InOrder, lower <= upper);
-        check(Check::Converged, answer.converged(self.pose_a, self.pose_b));
+        check(Check::Converged, answer.converged((self.a, self.pose_a), (self.b, self.pose_b)));
         check(Check::Honest, answer.is_honest(self.a, self.b));
         check(Check::Capped, answer.iterations() <= MAX_ITERATIONS);
     }

@@ -98,13 +98,16 @@ const PLANE: f64 = 256.0 * f64::EPSILON;
 
 impl Answer {
     /// Whether it is what was asked for. How deep the axis of a capsule is in a body is not measured,
-    /// that it is in it is an answer; and a half-space is known by its height over the origin of the
-    /// world, so that far from there rounding keeps the bracket wide.
-    pub(crate) fn converged(&self, pose_a: &Pose, pose_b: &Pose) -> bool {
+    /// that it meets it, to within the accuracy, is an answer; and a half-space is known by its height
+    /// over the origin of the world, so that far from there rounding keeps the bracket wide.
+    pub(crate) fn converged(&self, (a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>) -> bool {
         let (lower, upper) = self.bracket();
         self.status() == Status::Converged
             || match self {
-                Self::Capsule(_) => upper <= 0.0,
+                Self::Capsule(_) => {
+                    let of_axis = upper + capsule(b).radius_m();
+                    lower == f64::NEG_INFINITY && of_axis <= self.tolerance(a, b, Options::default().accuracy())
+                }
                 Self::HalfSpace(_) => {
                     upper - lower <= PLANE * pose_a.translation().norm().max(pose_b.translation().norm())
                 }

@@ -83,7 +83,7 @@ pub(super) const FAMILIES: [Family; 46] = [
     of_primitives(121, [16, 160], primitives::ties),
     row(22, [30, 300], Put::Own(motion::impact)),
     row(25, [2 * catalogue::data::KINDS, 3 * catalogue::data::KINDS + 100], Put::Own(data::ill_conditioned)),
-    of_primitives(125, [33, 321], primitives::ill_conditioned),
+    of_primitives(125, [23, 221], primitives::ill_conditioned),
     row(26, [catalogue::clouds::KINDS - 1, 6 * catalogue::clouds::KINDS], Put::Own(clouds::clouds)),
     row(27, [20, 200], Put::Own(depth::saturation)),
     of_primitives(127, [10, 100], primitives::saturation),

@@ -19,7 +19,21 @@ pub fn attempts() -> Vec<Attempt> {
         attempt(at, found, expected)
     };
     let z = Vector3::z();
+    // One size alone: where the inscribed ball is lost in rounding there is no body.
+    let cuboid = |x, y, z, expected| attempt([x, y, z], Body::cuboid("box", Vector3::new(x, y, z)), expected);
+    let cylinder = |radius, half, expected| attempt([radius, half], Body::cylinder("can", radius, half), expected);
+    let ellipsoid =
+        |x, y, z, expected| attempt([x, y, z], Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)), expected);
     vec![
+        cuboid(1e9, 1.0, 1.0, Some("Thin")),
+        cuboid(1.0, 1.0, 1e9, Some("Thin")),
+        cuboid(1e9, 1e9, 1e9, None),
+        cuboid(1e-9, 1e-9, 1e-9, None),
+        cylinder(1e-9, 1.0, Some("Thin")),
+        cylinder(1.0, 1e9, Some("Thin")),
+        ellipsoid(1e9, 1.0, 1.0, Some("Thin")),
+        ellipsoid(1e-9, 1e9, 1.0, Some("Unbounded")),
+        ellipsoid(1e9, 1e9, 1e9, None),
         capsule(f64::NAN, 1.0, any),
         capsule(1.0, f64::NAN, any),
         capsule(-1e-300, 1.0, any),
@@ -42,7 +56,7 @@ pub fn attempts() -> Vec<Attempt> {
 }
 
 /// Kinds of [`extreme`].
-pub const EXTREMES: u64 = 32;
+pub const EXTREMES: u64 = 22;
 
 /// A shape of sizes from 1e-12 to 1e12 m, or of both, and an ordinary one near it.
 pub fn extreme(index: u64, random: &mut dyn Draws) -> Pair {
@@ -60,26 +74,16 @@ pub fn extreme(index: u64, random: &mut dyn Draws) -> Pair {
         // One size alone, of each shape.
         10 => (of(Kind::Ball, [1e9, 0.0, 0.0]), Kind::Cut),
         11 => (of(Kind::Ball, [1e-9, 0.0, 0.0]), Kind::Cut),
-        12 => (of(Kind::Ellipsoid, [1e9, 1.0, 1.0]), Kind::Cuboid),
-        13 => (of(Kind::Ellipsoid, [1.0, 1.0, 1e-9]), Kind::Cylinder),
-        14 => (of(Kind::Cuboid, [1e9, 1.0, 1.0]), Kind::Smooth),
-        15 => (of(Kind::Cuboid, [1.0, 1e-9, 1.0]), Kind::Smooth),
-        16 => (of(Kind::Cuboid, [1.0, 1.0, 1e9]), Kind::Cylinder),
-        17 => (of(Kind::Cuboid, [1.0, 1.0, 1e-9]), Kind::Cuboid),
-        18 => (of(Kind::Cylinder, [1e9, 0.0, 1.0]), Kind::Smooth),
-        19 => (of(Kind::Cylinder, [1e-9, 0.0, 1.0]), Kind::Cut),
-        20 => (of(Kind::Cylinder, [1.0, 0.0, 1e9]), Kind::Cuboid),
-        21 => (of(Kind::Cylinder, [1.0, 0.0, 1e-9]), Kind::Cylinder),
-        22 => (of(Kind::Capsule, [1e9, 0.0, 1.0]), Kind::Cut),
-        23 => (of(Kind::Capsule, [1.0, 0.0, 1e9]), Kind::Cuboid),
-        24 => (of(Kind::Capsule, [1e-9, 0.0, 1.0]), Kind::Smooth),
-        25 => (of(Kind::Segment, [0.0, 0.0, 1e9]), Kind::Cut),
-        26 => (of(Kind::Segment, [0.0, 0.0, 1e-9]), Kind::Cuboid),
-        27 => (of(Kind::Smooth, [1.0, 1.0, 1e9]), Kind::Capsule),
-        28 => (of(Kind::Smooth, [1e-9, 1.0, 1.0]), Kind::Point),
-        29 => (of(Kind::Cut, [1.0, 1.0, 1e9]), Kind::Cuboid),
-        30 => (of(Kind::Cut, [1e-9, 1.0, 1.0]), Kind::HalfSpace),
-        31 => (of(Kind::Ellipsoid, [1e-9, 1e9, 1.0]), Kind::Capsule),
+        12 => (of(Kind::Cuboid, [1.0, 1e-9, 1.0]), Kind::Smooth),
+        13 => (of(Kind::Cuboid, [1.0, 1.0, 1e-9]), Kind::Cuboid),
+        14 => (of(Kind::Cylinder, [1e9, 0.0, 1.0]), Kind::Smooth),
+        15 => (of(Kind::Cylinder, [1.0, 0.0, 1e-9]), Kind::Cylinder),
+        16 => (of(Kind::Capsule, [1e9, 0.0, 1.0]), Kind::Cut),
+        17 => (of(Kind::Capsule, [1.0, 0.0, 1e9]), Kind::Cuboid),
+        18 => (of(Kind::Capsule, [1e-9, 0.0, 1.0]), Kind::Smooth),
+        19 => (of(Kind::Segment, [0.0, 0.0, 1e9]), Kind::Cut),
+        20 => (of(Kind::Segment, [0.0, 0.0, 1e-9]), Kind::Cuboid),
+        21 => (of(Kind::Cut, [1e-9, 1.0, 1.0]), Kind::HalfSpace),
         _ => (of(Kind::Cylinder, [1e2, 0.0, 1e-4]), Kind::Point),
     };
     let second = of(second, [0.3, 0.5, 0.7]);
