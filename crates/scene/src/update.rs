@@ -263,6 +263,7 @@ impl Scene {
             next.set_pose(slot, pose);
             changed.push(slot);
         }
+        check_placed_holders(&structure, &update.upserts)?;
         // What is held follows its holder before anything looks for its place in one.
         structure.derive();
         check_holders(&structure)?;
@@ -338,7 +339,12 @@ fn attach(structure: &mut Structure, next: &Scene, update: &Update) -> Result<()
         let attachment = Attachment { to: attach.to.clone(), pose, touch: attach.touch.clone() };
         structure.change(slot, |object| object.attachment = Some(attachment));
     }
-    for (at, placement) in entries(List::Upserts, &update.upserts) {
+    Ok(())
+}
+
+/// What placed objects are held by, and may touch, is there.
+fn check_placed_holders(structure: &Structure, placements: &[Placement]) -> Result<(), SceneError> {
+    for (at, placement) in entries(List::Upserts, placements) {
         if let Some(attachment) = &placement.attachment {
             find_holder(structure, at, (&placement.name, &attachment.to))?;
             check_touch(structure, at, &attachment.touch)?;

@@ -135,7 +135,7 @@ impl SolidObstacle {
 
     /// Triangles of its surface, world frame, metres; those of a cylinder make a prism inside it.
     pub(super) fn triangles(&self) -> Vec<[Vector3<f64>; 3]> {
-        let Vector3 { x, y, z } = self.half;
+        let [x, y, z] = self.half.into();
         let corner = |side: usize| {
             let (sine, cosine) = (std::f64::consts::TAU * side as f64 / SIDES as f64).sin_cos();
             if self.is_round {
