@@ -185,11 +185,15 @@ fn moving_out_by_the_depth_separates_and_by_less_does_not() {
 fn ties_are_flagged_and_limits_admitted() {
     let ball = Body::ball("ball", Vector3::zeros(), 1.0).unwrap();
     let concentric = cold(&ball, &Pose::identity(), &ball, &Pose::identity());
-    // More directions than the table has: the bracket is wide and true.
+    check(&concentric, 2.0, 1e-12, 1e-3, "concentric balls");
+    assert!(concentric.tied, "{concentric:?}");
+    // Nearly a ball: more directions than the table has, so that the bracket is wide and true.
+    let egg = Body::ellipsoid("egg", Vector3::zeros(), Vector3::new(1.0, 1.0, 1.0 + 1e-9)).unwrap();
+    let concentric = cold(&egg, &Pose::identity(), &egg, &Pose::identity());
     assert!(concentric.lower > 1.99 && concentric.lower <= 2.0 && concentric.upper >= 2.0, "{concentric:?}");
     assert!(concentric.tied && concentric.status == Status::BracketWide, "{concentric:?}");
     let options = Options::default().with_depth_accuracy(1e-2).unwrap();
-    let coarse = penetration(&ball, &Pose::identity(), &ball, &Pose::identity(), &options, &mut WarmStart::default());
+    let coarse = penetration(&egg, &Pose::identity(), &egg, &Pose::identity(), &options, &mut WarmStart::default());
     check(&coarse, 2.0, 1e-2, 1.0, "concentric");
     let cube = Body::cuboid("cube", Vector3::repeat(1.0)).unwrap();
     let slab = Body::cuboid("slab", Vector3::new(1.0, 2.0, 3.0)).unwrap();

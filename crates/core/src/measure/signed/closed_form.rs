@@ -22,7 +22,8 @@ pub(super) fn of_shapes(
     let (form_a, form_b) = (a.closed_form()?, b.closed_form()?);
     let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose_a.transform_point(x_a)) } else { None };
     let how = (start.as_ref(), options);
-    if let Some(SignedShapes::Signed(found)) = signed_of_shapes((form_a, pose_a), (form_b, pose_b), ELSEWHERE, how) {
+    let found = signed_of_shapes((form_a, pose_a), (form_b, pose_b), ELSEWHERE, how);
+    if let Some(SignedShapes::Signed(found)) = found {
         let (lower, upper) = (found.lower, found.upper);
         let tolerance = shape_tolerance(a, b, options, if upper < 0.0 { -lower } else { 0.0 });
         let tied = lower < 0.0 && found.elsewhere <= 2.0 * tolerance - lower;
@@ -33,8 +34,12 @@ pub(super) fn of_shapes(
         let answer = Answer { lower, upper, tied, iterations: found.steps, status: Status::Converged };
         return Some(answer.report((found.witness_a, found.witness_b), Some(found.normal), pose_a, pose_b));
     }
-    // The hint of an overlap is for those who know no closed form of it.
-    let mut hint = if let Hint::Shapes { .. } = warm.hint { *warm } else { WarmStart::default() };
+    let is_of_shapes = matches!(warm.hint, Hint::Cold | Hint::Shapes { .. });
+    // Where the last answer is that of an overlap without a closed form, the next is likely to be.
+    if found.is_none() && !is_of_shapes {
+        return None;
+    }
+    let mut hint = if is_of_shapes { *warm } else { WarmStart::default() };
     let apart = distance(a, pose_a, b, pose_b, options, &mut hint);
     if !(apart.lower > 0.0) || apart.status != Status::Converged {
         return None;

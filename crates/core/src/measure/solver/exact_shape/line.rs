@@ -95,25 +95,26 @@ impl Target {
         16.0 * f64::EPSILON * (self.reach() + start)
     }
 
-    /// Outward unit normal of the surface that a line crosses at a parameter; that of the surface
-    /// it is farthest beyond. None at the centre of a ball, and of rounded boxes.
+    /// Outward unit normal of the surface through which a line enters at a parameter: of those that
+    /// it moves towards, the one it is farthest beyond. None at the centre of a ball, and of rounded
+    /// boxes.
     pub(in crate::measure) fn normal(&self, line: &Line, s: f64) -> Option<Vector3<f64>> {
-        let y = line.at(s);
+        let (y, v) = (line.at(s), &line.velocity);
+        let entered = |beyond: f64, outwards: f64| if outwards < 0.0 { beyond } else { f64::NEG_INFINITY };
         match *self {
             Self::Ball { .. } => y.try_normalize(0.0),
             Self::Cuboid { half } => {
-                let axis = (y.abs() - half).imax();
+                let axis = Vector3::from_fn(|i, _| entered(y[i].abs() - half[i], y[i] * v[i])).imax();
                 let mut normal = Vector3::zeros();
                 normal[axis] = 1_f64.copysign(y[axis]);
                 Some(normal)
             }
             Self::Cylinder { radius, half_height } => {
                 let out = y.x.hypot(y.y);
-                if out - radius > y.z.abs() - half_height {
-                    Some(Vector3::new(y.x / out, y.y / out, 0.0))
-                } else {
-                    Some(Vector3::new(0.0, 0.0, 1_f64.copysign(y.z)))
-                }
+                let wall = entered(out - radius, y.x * v.x + y.y * v.y);
+                let is_wall = wall > entered(y.z.abs() - half_height, y.z * v.z);
+                let wall = || Vector3::new(y.x / out, y.y / out, 0.0);
+                Some(if is_wall { wall() } else { Vector3::new(0.0, 0.0, 1_f64.copysign(y.z)) })
             }
             Self::RoundedCuboid { .. } => None,
         }
