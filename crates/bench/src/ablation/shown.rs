@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// The stages in the order in which they are tried, as they are named in the CSV and for people,
 /// with the numbers of their methods.
-const TITLES: [(&str, &str); 34] = [
+const TITLES: [(&str, &str); 32] = [
     ("Balls", "balls, of decisions"),
     ("Planes", "planes, of decisions"),
     ("ClosedForm", "0: closed forms"),
