@@ -75,13 +75,16 @@ fn pairs(arm: &Arm, loaded: &LoadedArm) -> Vec<[usize; 2]> {
     all.filter(|&[a, b]| !loaded.robot.may_touch(arm.links[a].index, arm.links[b].index)).collect()
 }
 
+/// The states of each problem, and what is met in each of its random ones.
+type Everywhere = (Vec<ProblemStates>, Vec<Vec<Met>>);
+
 /// The states of all problems, and what is met in each.
 fn met_everywhere(
     arm: &Arm,
     pairs: &[[usize; 2]],
     sites: &[(u64, &Site<'_>)],
     (random, cores): (usize, usize),
-) -> Result<(Vec<ProblemStates>, Vec<Vec<Met>>), Box<dyn Error>> {
+) -> Result<Everywhere, Box<dyn Error>> {
     let (mut states, mut obstacles) = (Vec::new(), Vec::new());
     for (seed, site) in sites {
         states.push(ProblemStates::new(arm, site.problem, random, *seed)?);
