@@ -144,7 +144,8 @@ async fn paths_with_unusable_values_are_invalid_and_no_others() {
     cell(&client, &robot).await;
     let nan = f64::NAN;
     // The configuration that is wrong, counted over all paths, and what the reason says of it.
-    let paths: [(&[[f64; 2]], Option<&[&str]>); 7] = [
+    type Case<'a> = (&'a [[f64; 2]], Option<&'a [&'a str]>);
+    let paths: [Case<'_>; 7] = [
         (&[[0.0, nan], [-0.5, 0.0]], Some(&["joint_values[0]: ", "slide is NaN", "give a finite number"])),
         (&[[0.0, 0.0], [-0.5, 0.0]], None),
         (&[[0.0, 0.0], [nan, 0.0], [-0.5, 0.0]], Some(&["joint_values[5]: ", "lift is NaN"])),
@@ -171,7 +172,7 @@ async fn paths_with_unusable_values_are_invalid_and_no_others() {
     }
     assert!(found.complete && found.motions.len() == paths.len());
     // Without an invalid path there are no reasons.
-    let free = MotionsQuestion::of_robot("one", []).with_edges(&paths[1].0[..]);
+    let free = MotionsQuestion::of_robot("one", []).with_edges(paths[1].0);
     assert_eq!(client.check_motions("cell", free).await.expect("answered").motions[0].reason, None);
 }
 

@@ -97,9 +97,10 @@ pub(crate) const MEASURES: [Measure; crate::draw::MEASURES] = [
 const PLANE: f64 = 256.0 * f64::EPSILON;
 
 impl Answer {
-    /// Whether it is what was asked for. How deep the axis of a capsule is in a body is not measured,
-    /// that it meets it, to within the accuracy, is an answer; and a half-space is known by its height
-    /// over the origin of the world, so that far from there rounding keeps the bracket wide.
+    /// Whether it is what was asked for. How deep the axis of a capsule is in a body is not
+    /// measured, that it meets it, to within the accuracy, is an answer; and a half-space is known
+    /// by its height over the origin of the world, so that far from there rounding keeps the
+    /// bracket wide.
     pub(crate) fn converged(&self, (a, pose_a): Placed<'_>, (b, pose_b): Placed<'_>) -> bool {
         let (lower, upper) = self.bracket();
         self.status() == Status::Converged
@@ -186,13 +187,13 @@ impl Answer {
         match self {
             Answer::Distance(answer) => of_two(&answer.witness_a, &answer.witness_b),
             Answer::Signed(answer) if answer.lower > 0.0 => of_two(&answer.witness_a, &answer.witness_b),
-            // The ends of a translation, and points of bodies as they have grown, which are theirs to
-            // check.
+            // The ends of a translation, and points of bodies as they have grown, which are theirs
+            // to check.
             Answer::Signed(_) | Answer::Growth(_) => true,
             Answer::Level(answer) => within(b, &answer.witness, 0.0),
             Answer::Capsule(answer) => {
-                // Where the axis is met one point stands for both, as near to each as the bracket is
-                // wide.
+                // Where the axis is met one point stands for both, as near to each as the bracket
+                // is wide.
                 answer.normal.is_none() || within(a, &answer.witness, seen_from(b, &answer.witness))
             }
             Answer::Point(answer) => answer.inside || within(a, &answer.witness, seen_from(b, &answer.witness)),

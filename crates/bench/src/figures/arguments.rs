@@ -89,9 +89,9 @@ pub(super) struct Table1Args {
 /// the endurance bench, other questions, the stability families and the named rescues
 ///
 /// Writes ablation.csv and fills its blocks in the pages of --out; names what is rescued on the
-/// standard output. Fails where a bracket is wrong without some stage. Needs a build whose stages can
-/// be switched off, and whose times are not those of the library. Each query is solved some five
-/// times.
+/// standard output. Fails where a bracket is wrong without some stage. Needs a build whose stages
+/// can be switched off, and whose times are not those of the library. Each query is solved some
+/// five times.
 ///
 /// cargo run --release -p sublevel-bench --features ablation -- ablation --queries 3e6 --out docs
 #[derive(Debug, Args)]

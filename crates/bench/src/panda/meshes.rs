@@ -29,8 +29,8 @@ struct Placed {
     around: Bounds,
 }
 
-/// Compares what representations call free with what the meshes meet, in `random` states anywhere of
-/// each problem: those of [`ProblemStates`]. All cores work.
+/// Compares what representations call free with what the meshes meet, in `random` states anywhere
+/// of each problem: those of [`ProblemStates`]. All cores work.
 ///
 /// # Errors
 /// Obstacles that are no boxes or cylinders.

@@ -255,8 +255,9 @@ impl Body {
         &self.outline
     }
 
-    /// About the point of the body that is farthest along a unit vector, by its outline; both in the
-    /// body frame, metres. Of bodies with edges one on the surface, with the constraint active there.
+    /// About the point of the body that is farthest along a unit vector, by its outline; both in
+    /// the body frame, metres. Of bodies with edges one on the surface, with the constraint active
+    /// there.
     pub(crate) fn farthest_in_table(&self, n: &Vector3<f64>) -> (Vector3<f64>, usize) {
         let n: [f64; 3] = (*n).into();
         let cell = self.outline.cell::<_, f64>(Scalar, n);

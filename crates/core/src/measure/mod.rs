@@ -9,8 +9,9 @@
 //! takes over. No method's result is accepted by itself: an answer is accepted when its bracket
 //! (`bounds`) is narrow enough. A bracket determines the normal to about the root of its width
 //! only, so the optimality equations are checked as well. Solids of several parts are solved pair
-//! by pair (`pairwise_minimum`), few of them, for trees bound the others (`part_pairs`). Imports go one way: measures on `solver`, that on `bounds`, these
-//! on `frames`. Neither clock nor allocator nor threads are used.
+//! by pair (`pairwise_minimum`), few of them, for trees bound the others (`part_pairs`). Imports go
+//! one way: measures on `solver`, that on `bounds`, these on `frames`. Neither clock nor allocator
+//! nor threads are used.
 
 mod batch;
 mod bounds;

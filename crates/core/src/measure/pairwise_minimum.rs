@@ -122,8 +122,8 @@ pub(in crate::measure) fn nearest<T: Bracketed, F: Fn(usize, usize) -> NodeBound
     known.least(warm)
 }
 
-/// The same for the parts of one solid, with a bound of the measure for all that is in a ball of its
-/// frame.
+/// The same for the parts of one solid, with a bound of the measure for all that is in a ball of
+/// its frame.
 pub(in crate::measure) fn nearest_part<T: Bracketed>(
     solid: &impl Solid,
     bound: impl Fn(&Ball) -> f64,

@@ -1,5 +1,5 @@
-//! Pairs of parts of two solids by their trees: a bound that holds for all parts of two nodes leaves
-//! them out together, and the likelier ones come first.
+//! Pairs of parts of two solids by their trees: a bound that holds for all parts of two nodes
+//! leaves them out together, and the likelier ones come first.
 
 use crate::body::{Ball, Body, NodeContent, PartCenters, PartNode, PartTree, Solid};
 use crate::measure::bounds::culling::CULLING_SLACK;
@@ -76,8 +76,8 @@ pub(in crate::measure) struct TreePair<'a, F> {
     bound: F,
 }
 
-/// Two trees where they stand, with the gaps of their balls: lower bounds of distances, and of minus
-/// the depths, of all parts.
+/// Two trees where they stand, with the gaps of their balls: lower bounds of distances, and of
+/// minus the depths, of all parts.
 pub(in crate::measure) fn ball_gaps<'a>(
     (a, pose_a): (&'a [PartNode], &Pose),
     (b, pose_b): (&'a [PartNode], &Pose),

@@ -37,8 +37,8 @@ pub struct PointDistance {
     pub status: Status,
     /// Proven lower bound; 0 when the point is not proven outside.
     pub lower: f64,
-    /// Proven upper bound, which the witness attains within the accuracy asked for; 0 when the point
-    /// is proven inside.
+    /// Proven upper bound, which the witness attains within the accuracy asked for; 0 when the
+    /// point is proven inside.
     pub upper: f64,
     /// Whether the point is proven to lie in the body; the distance is then 0, and depth is not
     /// measured.
@@ -400,8 +400,8 @@ const INWARD: [f64; 4] = [0.0, 1e-9, 1e-6, 1e-3];
 /// tried. It changes time only; no test pins it.
 const ON_SURFACE: f64 = 1e-3;
 
-/// A point of a segment, known up to an error, that is proven to lie in a body: one of it that seems
-/// to be on the surface, or a little on from there along the segment, into the body.
+/// A point of a segment, known up to an error, that is proven to lie in a body: one of it that
+/// seems to be on the surface, or a little on from there along the segment, into the body.
 fn point_inside(body: &Posed<'_>, segment: &Segment, point: &Vector3<f64>, error: f64) -> Option<Vector3<f64>> {
     let value = |i: &usize| body.value(*i, point);
     let highest = (0..body.len()).max_by(|i, j| value(i).total_cmp(&value(j)))?;

@@ -36,8 +36,8 @@ fn judged(pair: &Pair, warm: &mut WarmStart, label: &str) -> (Solved, Reference)
     (found, truth)
 }
 
-/// A cold answer whose bracket is not known to get as narrow as it should, here named one by one: it
-/// holds the truth, and a wide one is marked as such.
+/// A cold answer whose bracket is not known to get as narrow as it should, here named one by one:
+/// it holds the truth, and a wide one is marked as such.
 fn wide(pair: &Pair) {
     let (found, truth) = (pair.solve(&pair.options(), &mut WarmStart::default()), pair.truth().value());
     let label = format!("{}: {found:?} against {truth:e}", pair.what);
@@ -260,8 +260,8 @@ fn family_12_needles_and_plates_of_primitives() {
 
 #[test]
 fn family_13_parallel_flats_of_primitives() {
-    // A segment over a flat of degree 8, tilted by 1e-10 to 1e-6, at accuracies of 1e-12 and finer: 4e-12
-    // to 4e-11 m wide.
+    // A segment over a flat of degree 8, tilted by 1e-10 to 1e-6, at accuracies of 1e-12 and finer:
+    // 4e-12 to 4e-11 m wide.
     const WIDE: [u64; 9] = [1707, 1736, 1765, 1968, 1997, 2026, 2229, 2258, 2287];
     each(0..PARALLEL_FLATS, |index| {
         let pair = parallel_flats(index);

@@ -16,8 +16,8 @@ pub const MAX_CONTROL_POINTS: usize = 16;
 ///
 /// Between waypoints joint values are straight lines, those of planar joints too: their two
 /// coordinates and their angle. Floating joints go from pose to pose as a screw: at a constant rate
-/// about a line and along it, by the smaller angle. With n segments, segment k is the part `k / n <=
-/// s <= (k + 1) / n`.
+/// about a line and along it, by the smaller angle. With n segments, segment k is the part `k / n
+/// <= s <= (k + 1) / n`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Path {

@@ -153,7 +153,7 @@ fn a_near_miss_before_the_first_contact_is_told() {
         fine.alpha,
         contact.s
     );
-    // Without a contact it is the open pair that is told, as before.
+    // Without a contact the answer names the open pair, as before.
     let short = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 1.0, 0.0]);
     let passing = prove(&problem, &short, &MotionOptions { resolution_m: 0.05, ..FIRST });
     assert_eq!((passing.verdict, passing.open), (MotionVerdict::Undecided, None));

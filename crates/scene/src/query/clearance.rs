@@ -153,7 +153,8 @@ impl Clearance {
                 Other::Standing(other) => self.placed.standing(other).map(|thing| (other, thing)),
             };
             let Some((other_slot, b)) = thing else { return true };
-            // Distances say nothing below 0; signed ones of capsules are asked for one by one there.
+            // Distances say nothing below 0; signed ones of capsules are asked for one by one
+            // there.
             let stands = matches!(other, Other::Standing(_));
             if stands && threshold >= 0.0 && LanePair::of(&a, &b).is_some() {
                 if a.box_gap_m(&b) <= threshold + slack_m {

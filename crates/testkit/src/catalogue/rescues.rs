@@ -1,8 +1,8 @@
 //! Queries that commits name as rescued: each of them had no answer as narrow as asked for, or took
 //! a way that led to none, until a method was made or changed for it.
 //!
-//! They were drawn by the endurance bench. Here they are by their poses, since a draw depends on the
-//! list of bodies and, near contact, on the last digits of other answers.
+//! They were drawn by the endurance bench. Here they are by their poses, since a draw depends on
+//! the list of bodies and, near contact, on the last digits of other answers.
 
 use crate::bodies::{b, cut, cylinder, q};
 use sublevel_core::body::Body;
@@ -28,8 +28,8 @@ pub struct Rescue {
     pub at: [Place; 2],
     /// Where they stood when the hint was made; none without one.
     pub before: Option<[Place; 2]>,
-    /// Width that its bracket may keep, in the unit of the answer, where it is not as narrow as asked
-    /// for yet.
+    /// Width that its bracket may keep, in the unit of the answer, where it is not as narrow as
+    /// asked for yet.
     pub widest: Option<f64>,
     /// Where it was drawn, and what had to be done.
     pub what: String,
@@ -43,9 +43,9 @@ pub fn all() -> Vec<Rescue> {
     tilted_sides().into_iter().chain(tilted_flats()).collect()
 }
 
-/// Thin and small boxes over sides tilted by 1e-9 to 1e-5, which stayed wide: 28abc53, 60fda9a (block
-/// 3319 query 2504 of seed 21, the first), 86c5622 (the plate and the can) and a91e8ca (block 1087
-/// query 3129, the second, and the needle).
+/// Thin and small boxes over sides tilted by 1e-9 to 1e-5, which stayed wide: 28abc53, 60fda9a
+/// (block 3319 query 2504 of seed 21, the first), 86c5622 (the plate and the can) and a91e8ca
+/// (block 1087 query 3129, the second, and the needle).
 fn tilted_sides() -> [Rescue; 6] {
     let (small, plate) = (b(0.02, 0.03, 0.01), b(1.0, 1.0, 1e-3));
     let (can, needle) = (cylinder(0.5, 0.8), q(8, 0.05, 0.05, 1.0));

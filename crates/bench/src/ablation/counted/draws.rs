@@ -21,8 +21,8 @@ const FITTED: [&str; 2] = [
     include_str!("../../../benches/instructions/human-d6.json"),
 ];
 
-/// The bodies that the endurance bench needs no fit for, two fitted ones, and smooth bodies that cut
-/// each other, which have edges and no closed form.
+/// The bodies that the endurance bench needs no fit for, two fitted ones, and smooth bodies that
+/// cut each other, which have edges and no closed form.
 pub(crate) fn bodies() -> Vec<Body> {
     let mut all: Vec<Body> = soak::bodies().iter().map(|body| own(&body.to_json()).clone()).collect();
     let cut = all.iter().filter(|body| body.name().starts_with('P')).flat_map(|body| {

@@ -7,8 +7,8 @@ use sublevel_testkit::Seeded;
 use sublevel_testkit::bodies;
 use sublevel_testkit::catalogue::{Case, contact, placement, scale};
 
-/// Puts the cases, at their accuracies, as distances of all kinds and as a decision: at most `count`
-/// of each family.
+/// Puts the cases, at their accuracies, as distances of all kinds and as a decision: at most
+/// `count` of each family.
 pub(crate) fn families(table: &mut Table, count: u64) {
     let zoo = bodies::zoo();
     let mut put = |family: u8, cases: &mut dyn Iterator<Item = Vec<Case>>| {

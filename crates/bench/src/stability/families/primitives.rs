@@ -324,8 +324,8 @@ pub(super) fn swapped(seed: u64, method: Method) -> Put {
     })
 }
 
-/// Boxes or cylinders that mirror each other and a shape between them: tied in the mirror plane, not
-/// beside it, and flagged wherever the normal jumps.
+/// Boxes or cylinders that mirror each other and a shape between them: tied in the mirror plane,
+/// not beside it, and flagged wherever the normal jumps.
 pub(super) fn ties(seed: u64, method: Method) -> Put {
     if !matches!(method, Method::Cold | Method::Warm) {
         return Ok(None);
@@ -407,8 +407,8 @@ pub(super) fn ill_conditioned(seed: u64, method: Method) -> Put {
     put(&data::extreme(seed, &mut random(125, seed)), method)
 }
 
-/// The level distance among balls, boxes, cylinders and what slabs cut, and over them; what is none of bodies has
-/// none.
+/// The level distance among balls, boxes, cylinders and what slabs cut, and over them; what is none
+/// of bodies has none.
 pub(super) fn saturation(seed: u64, method: Method) -> Put {
     static ZOO: OnceLock<Vec<Body>> = OnceLock::new();
     let zoo = ZOO.get_or_init(|| {

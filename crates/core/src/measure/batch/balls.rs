@@ -8,8 +8,8 @@ use crate::measure::solver::exact_shape::{LaneBracket, LaneSet};
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Lanes, MAX_LANES, Number, Simd, Vector, WithSimd, gamma};
 
-/// Rounding of a distance by the projection of a point, relative to the sizes that it is the sum of;
-/// dimensionless. As many roundings as single queries count for the same.
+/// Rounding of a distance by the projection of a point, relative to the sizes that it is the sum
+/// of; dimensionless. As many roundings as single queries count for the same.
 ///
 /// A smaller value could make brackets miss the distance; a larger one widens them. Exercised by
 /// `balls_are_as_far_as_single_queries_say`.

@@ -44,8 +44,8 @@ pub(super) fn axis_gap((ball, pose): At<'_, Ball>, (capsule, capsule_pose): At<'
 }
 
 /// From above by the ball about the body's interior point, from below by a plane across the gap
-/// between the body and the place of the axis that is nearest to that point: not of closed forms, of
-/// which a step costs no more than a plane.
+/// between the body and the place of the axis that is nearest to that point: not of closed forms,
+/// of which a step costs no more than a plane.
 fn ball_and_plane((body, pose): At<'_, Body>, (capsule, capsule_pose): At<'_, Capsule>) -> [f64; 2] {
     let (between, apart, error) = across((pose, body.interior_point()), (capsule_pose, &Vector3::zeros()));
     // Every point of the body is within its diameter of its interior point.

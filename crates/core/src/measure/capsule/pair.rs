@@ -33,8 +33,8 @@ const MAX_PLACES: u32 = 64;
 /// larger, they end wider than need be. Exercised by `family_13_parallel_flats_of_primitives`.
 const ROUNDING_FLOORS: [f64; 2] = [1e-13, 1e-12];
 
-/// Width of a bracket at a rounding floor, relative to the distance, dimensionless, beyond which the
-/// places along the axis are tried as well: they lose fewer digits near contact.
+/// Width of a bracket at a rounding floor, relative to the distance, dimensionless, beyond which
+/// the places along the axis are tried as well: they lose fewer digits near contact.
 ///
 /// Larger, distances near contact are known less well than they might be; smaller, pairs farther
 /// apart take longer for digits that nobody asked for. Exercised by
@@ -337,8 +337,8 @@ impl Problem<'_> {
         }
     }
 
-    /// What is known by the way from a place on the axis, whose middle is at `center`, to the body's
-    /// interior point.
+    /// What is known by the way from a place on the axis, whose middle is at `center`, to the
+    /// body's interior point.
     fn towards_interior(
         &self,
         (body, pose): At<'_, Body>,

@@ -112,8 +112,8 @@ fn first_to_touch(
 
 /// Lower bound of the growth distance of any two parts in two nodes.
 ///
-/// A part lies in the ball of its reach R about its centre, and grown by s in that of s R: where two
-/// touch, `|Δ| <= s (R_A + R_B)`. Of all parts in two nodes |Δ| is at least the gap between two
+/// A part lies in the ball of its reach R about its centre, and grown by s in that of s R: where
+/// two touch, `|Δ| <= s (R_A + R_B)`. Of all parts in two nodes |Δ| is at least the gap between two
 /// balls that contain the centres, and R at most the largest reach. Where those balls meet, the
 /// quotient is negative: it bounds nothing, and still says which nodes are likelier.
 pub(super) fn growth_bound(seen: &SeenFrame, of_a: &PartCenters, of_b: &PartCenters) -> f64 {

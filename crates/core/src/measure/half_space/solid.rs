@@ -20,7 +20,7 @@ use nalgebra::Vector3;
 /// changes time only; no test pins it.
 const ROUGH: f64 = 1e-2;
 
-/// Until the bracket is narrow, or tells what is asked of the distance.
+/// The signed distance, as soon as its bracket is narrow or meets the goal.
 pub(super) fn distance_until(
     (solid, pose): At<'_, impl Solid>,
     half_space: &HalfSpace,

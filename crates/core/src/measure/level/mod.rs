@@ -100,12 +100,12 @@ fn lowest(
 ///
 /// the second because t >= 1, so that the smaller p(c), the larger the left side. That increases
 /// with t and decreases with m: the largest m and reach of the parts in a node, and the smallest r,
-/// from a ball that contains their interior points, bound all of them. More than a line is not to be
-/// had of convexity alone, and the reach is that of the longest axis: of elongated parts the bound
-/// is far below the level, and hardly any pair is left out
-/// (`few_of_many_parts_are_touched`); of round ones, and of parts much farther away than others, it
-/// leaves out what it can, for less than two bounds a pair. Nearer than the reach nothing is
-/// proven, and the nodes come in the order of t, which is at most 1, as what is proven never is.
+/// from a ball that contains their interior points, bound all of them. More than a line is not to
+/// be had of convexity alone, and the reach is that of the longest axis: of elongated parts the
+/// bound is far below the level, and hardly any pair is left out (`few_of_many_parts_are_touched`);
+/// of round ones, and of parts much farther away than others, it leaves out what it can, for less
+/// than two bounds a pair. Nearer than the reach nothing is proven, and the nodes come in the order
+/// of t, which is at most 1, as what is proven never is.
 pub(super) fn level_bound(seen: &SeenFrame, of_a: &PartCenters, of_b: &Ball) -> NodeBound {
     let PartCenters { interior: Centers { ball, reach }, min_value, .. } = of_a;
     let times = seen.gap(ball, of_b) / reach * (1.0 - CULLING_SLACK);

@@ -1,5 +1,5 @@
-//! Rays, swept balls, signed distances, depths and growth distances of boxes, cylinders and balls by
-//! their closed forms: against the general search, which knows nothing of these, and against
+//! Rays, swept balls, signed distances, depths and growth distances of boxes, cylinders and balls
+//! by their closed forms: against the general search, which knows nothing of these, and against
 //! corners, differences and formulas of special positions.
 
 use super::{random_pose, twisted};
@@ -78,12 +78,13 @@ fn assert_meet(one: &RayCast, other: &RayCast, label: &str) {
     }
 }
 
-/// A ray towards a body: into it, past its edges, along its axes and within 1e-16 of these, from
-/// near and far, over any length.
-fn ray(random: &mut Seeded, body: &Body, pose: &Pose, seed: u64) -> Ray {
+/// A ray towards a body, or that far past it: into it, past its edges, along its axes and within
+/// 1e-16 of these, from near and far, over any length.
+fn ray(random: &mut Seeded, body: &Body, pose: &Pose, seed: u64, past: f64) -> Ray {
     let form = body.closed_form().unwrap();
     let ball = body.circumscribed();
     let target = pose.transform_point(&(form.support_point(&random.unit()) * 0.999 + ball.center * 0.001));
+    let target = target + random.unit() * past;
     // Coordinates beyond 1e15 m are refused.
     let away = (ball.radius * [0.3, 3.0, 100.0, 1e4][(seed / 3 % 4) as usize]).min(1e14);
     let mut direction = match seed / 12 % 4 {
@@ -106,26 +107,31 @@ fn rays_enter_shapes() {
         let body = shape(&mut random, seed % 3, scale(seed));
         let size = body.circumscribed().radius;
         let pose = random_pose(&mut random, (size * [0.0, 1.0, 1e3][(seed % 3) as usize]).min(FARTHEST));
-        let ray = ray(&mut random, body, &pose, seed);
+        let ray = ray(&mut random, body, &pose, seed, 0.0);
         let ask = || cast_ray(body, &pose, &ray, &Options::default());
         let (found, general) = (only(&[Stage::ClosedForm], ask), except(&[Stage::ClosedForm], ask));
         let label = format!("seed {seed} {}: {ray:?}", body.name());
         assert_meet(&found, &general, &label);
         assert_meet(&ask(), &general, &label);
         match (&found, &general) {
-            (RayCast::Hit(hit), RayCast::Hit(other)) => {
+            (RayCast::Hit(hit), RayCast::Hit(_)) => {
                 hits += 1;
                 assert_eq!(hit.status, Status::Converged, "{label}: {found:?}");
                 assert_eq!(hit.normal.is_none(), hit.upper == 0.0, "{label}: {found:?}");
                 assert!(hit.point == ray.point(hit.upper), "{label}");
-                if let (Some(n), Some(m)) = (hit.normal, other.normal) {
+                if let Some(n) = hit.normal {
                     assert!((n.norm() - 1.0).abs() < 1e-12 && n.dot(ray.direction()) < 1e-9, "{label}: {found:?}");
-                    // Beside an edge either face is as good, and where a wall is entered is known to 1e-9.
+                    // It is the gradient of a constraint that the point meets, to within its
+                    // rounding.
                     let own = pose.inverse_transform_point(&hit.point);
-                    let values = body.constraints().iter().map(|c| body.placement().jet(c, &own).value);
-                    let on = values.filter(|value| *value > 1.0 - 1e-6).count();
-                    let bend = 1e-5 + 1e-8 * size / body.in_radius();
-                    assert!((n - m).norm() < bend || on > 1, "{label}: {n:?} {m:?}");
+                    let rounding = 1e-14 * (hit.point.norm() + pose.translation().norm() + size);
+                    let off = (hit.upper - hit.lower + rounding) / body.in_radius();
+                    let meets = body.constraints().iter().any(|constraint| {
+                        let jet = body.placement().jet(constraint, &own);
+                        let m = pose.transform_direction(&jet.gradient.normalize());
+                        (jet.value - 1.0).abs() < 4.0 * off + 1e-12 && (n - m).norm() < 2.0 * off + 1e-9
+                    });
+                    assert!(meets, "{label}: {found:?} beside {general:?}");
                 }
             }
             (RayCast::Miss, _) => misses += 1,
@@ -144,8 +150,9 @@ fn swept_balls_touch_balls_and_boxes() {
         let body = shape(&mut random, seed % 2, scale(seed));
         let size = body.circumscribed().radius;
         let pose = random_pose(&mut random, size);
-        let ray = ray(&mut random, body, &pose, seed);
-        let sweep = Sweep::new(ray, size * 10_f64.powf(2.0 * random.signed() - 1.0)).unwrap();
+        let radius = size * 10_f64.powf(2.0 * random.signed() - 1.0);
+        let past = if seed.is_multiple_of(3) { 1.5 * (size + radius) } else { 0.0 };
+        let sweep = Sweep::new(ray(&mut random, body, &pose, seed, past), radius).unwrap();
         let ask = || cast_ball(body, &pose, &sweep, &Options::default());
         let (found, general) = (only(&[Stage::ClosedForm], ask), except(&[Stage::ClosedForm], ask));
         let label = format!("seed {seed} {}: {sweep:?}", body.name());
@@ -356,7 +363,9 @@ fn nearly_parallel_edges_keep_their_bracket() {
         );
     }
     println!("nearly parallel: {alone} of {count} alone");
-    // Where a needle turns by more than 1e-12 its depth is known to its length times the angle.
+    // The axis across edges that are parallel but for 1e-7 to 1e-3 is off by rounding over that
+    // angle, which is more than asked for where it competes with a face; and needles seldom get an
+    // aligned normal.
     assert!(alone * 100 >= count * 75, "{alone} of {count}");
 }
 

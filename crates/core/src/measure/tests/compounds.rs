@@ -167,7 +167,8 @@ fn levels_and_growths_are_those_of_the_least_pair() {
     }
 }
 
-/// Of capsules and points the nearest part counts, too, with hints and without; and decisions agree.
+/// Of capsules and points the nearest part counts, too, with hints and without; and decisions
+/// agree.
 #[test]
 fn capsules_and_points_are_as_far_as_the_nearest_part() {
     let options = Options::default();
@@ -300,9 +301,9 @@ fn cloud(random: &mut Seeded, count: usize) -> Compound {
 }
 
 /// Of solids with many parts every measure but the level distance evaluates bounds of few nodes and
-/// solves few pairs: both grow far less than the number of pairs. Level distances of elongated parts
-/// grow with the square of what their bound grows with, and most pairs are solved; of these the
-/// trees evaluate no more bounds than there are nodes on the way.
+/// solves few pairs: both grow far less than the number of pairs. Level distances of elongated
+/// parts grow with the square of what their bound grows with, and most pairs are solved; of these
+/// the trees evaluate no more bounds than there are nodes on the way.
 #[test]
 fn few_of_many_parts_are_touched() {
     type Ask = fn(&Compound, &Compound, &Pose, &mut WarmStart);

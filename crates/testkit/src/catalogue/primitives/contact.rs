@@ -15,8 +15,8 @@ pub const KISSING: u64 = 3 * COUNT;
 const HALVES: [[f64; 3]; 2] = [[0.5, 0.25, 1.0], [0.25, 2.0, 0.5]];
 
 /// Family 1. Along one of the axes, from a centimetre of overlap to a centimetre apart, over an ulp
-/// of the offset and none: error of at most 1e-12 m, of capsules on the flat tip of a body of degree
-/// 8 the floor that `Options::with_accuracy` states for flat surfaces.
+/// of the offset and none: error of at most 1e-12 m, of capsules on the flat tip of a body of
+/// degree 8 the floor that `Options::with_accuracy` states for flat surfaces.
 pub fn kissing(index: u64) -> Vec<Pair> {
     let (kinds, axis) = (PAIRS[(index % COUNT) as usize], (index / COUNT % 3) as usize);
     let [half_a, half_b] = [0, 1].map(|k| Shape::halves(kinds[k], HALVES[k])[axis]);

@@ -22,8 +22,8 @@ const LEVEL: f64 = 1e-12;
 /// Width of the bracket whose witnesses 200 bits start from, relative to the size of the pair.
 const TIGHT: f64 = 1e-12;
 
-/// Width of the reference's own bracket, relative to the width that is narrow enough, up to which it
-/// decides.
+/// Width of the reference's own bracket, relative to the width that is narrow enough, up to which
+/// it decides.
 const SHARP: f64 = 1e-2;
 
 /// The floor that `Options::with_accuracy` states, relative to the larger shape and the distance of
@@ -40,8 +40,8 @@ const GRADIENT: f64 = 1e-6;
 impl Pair {
     /// What 200 bits say, from a tight answer of ours.
     pub fn truth(&self) -> Reference {
-        // Under faces that tilt by less than the accuracy only a tighter one ends at the corner where
-        // the reference is sharp.
+        // Under faces that tilt by less than the accuracy only a tighter one ends at the corner
+        // where the reference is sharp.
         let tight = Self { accuracy: TIGHT.min(1e-2 * self.accuracy), limit: None, ..self.clone() };
         self.reference(&tight.solve(&tight.options(), &mut WarmStart::default()))
     }
@@ -111,8 +111,8 @@ impl Pair {
         if !(beyond <= 0.0) {
             return wrong(format!("a witness is outside of its shape, by {beyond:e}"));
         }
-        // Of signed distances the witnesses lie along the normal, whose error turns radii; where axes
-        // meet, nothing is said of where.
+        // Of signed distances the witnesses lie along the normal, whose error turns radii; where
+        // axes meet, nothing is said of where.
         let apart = found.witness_a - found.witness_b;
         let is_signed = |shape: &Shape| matches!(shape, Shape::Capsule(_) | Shape::HalfSpace);
         let by_normal = found.normal.filter(|_| is_signed(&self.a) || is_signed(&self.b));
@@ -131,8 +131,8 @@ impl Pair {
     /// depth of an axis.
     pub fn slope_flaw(&self, found: &Solved, truth: &Reference) -> Option<Flaw> {
         let (Some(gradients), Some(_)) = (found.gradients, truth.normal) else {
-            // At distances below the accuracy nothing is promised. A signed distance goes on through
-            // contact, as long as the axis is outside.
+            // At distances below the accuracy nothing is promised. A signed distance goes on
+            // through contact, as long as the axis is outside.
             let is_signed = matches!((&self.a, &self.b), (Shape::Capsule(_), _) | (_, Shape::Capsule(_)));
             let is_apart = found.lower > 0.0 || is_signed && truth.normal.is_some();
             let is_due = is_apart && truth.value() + self.radius() > self.accuracy * self.size();

@@ -41,8 +41,8 @@ pub fn common_point(index: u64, random: &mut dyn Draws) -> Pair {
 /// Cases of [`along_an_axis`]: all pairs along 3 axes by 14 shifts.
 pub const ALONG_AN_AXIS: u64 = 3 * 14 * COUNT;
 
-/// Family 6. Of the same sizes, or over a half-space, with integer coordinates: each mirrors itself in
-/// the planes of the axes, so that the distance is what the offset exceeds both half-sizes by.
+/// Family 6. Of the same sizes, or over a half-space, with integer coordinates: each mirrors itself
+/// in the planes of the axes, so that the distance is what the offset exceeds both half-sizes by.
 pub fn along_an_axis(index: u64) -> Pair {
     let sizes = [1.0, 2.0, 3.0];
     let kinds = PAIRS[(index % COUNT) as usize];

@@ -48,14 +48,17 @@ pub(in crate::measure) fn growth_of_shapes(
     if options.exhausted(0) {
         return None;
     }
-    if let Some(radius) = of_a.0.shape().ball_radius_m() {
-        return with_ball((of_a, radius), of_b, radii).map(|(found, _)| found);
+    match [of_a, of_b].map(|(form, _)| form.shape().ball_radius_m()) {
+        // From the centre of the smaller ball, where the witness is rounded less.
+        [Some(radius), other] if other.is_none_or(|other| radius <= other) => {
+            with_ball((of_a, radius), of_b, radii).map(|(found, _)| found)
+        }
+        [_, Some(radius)] => {
+            let (found, of_other) = with_ball((of_b, radius), of_a, radii)?;
+            Some(GrowthOfShapes { of_a: of_other, normal: -found.normal, ..found })
+        }
+        _ => of_cuboids(of_a, of_b, radii, start, options),
     }
-    if let Some(radius) = of_b.0.shape().ball_radius_m() {
-        let (found, of_other) = with_ball((of_b, radius), of_a, radii)?;
-        return Some(GrowthOfShapes { of_a: of_other, normal: -found.normal, ..found });
-    }
-    of_cuboids(of_a, of_b, radii, start, options)
 }
 
 /// Of a ball A, with the point of B that grows to the witness.
@@ -75,7 +78,7 @@ fn with_ball(
     let reach = target.reach();
     let turned = 3.0 * (RELATIVE_ERROR + gamma(8));
     let off = target.rounding(0.0) + turned * reach + ball.displacement_m() + form_b.displacement_m();
-    // The way out is the way in, seen from behind.
+    // A ray from the centre leaves the set where the opposite ray, run backwards, enters it.
     let behind = Line { start: Vector3::zeros(), velocity: -u };
     let leaves = |larger: f64| target.first(&behind, larger, (-2.0 * reach, 0.0)).map(|s| -s);
     let (farthest, nearest) = (leaves(off)?, leaves(-off)?);

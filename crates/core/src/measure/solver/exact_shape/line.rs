@@ -96,8 +96,8 @@ impl Target {
     }
 
     /// Outward unit normal of the surface through which a line enters at a parameter: of those that
-    /// it moves towards, the one it is farthest beyond. None at the centre of a ball, and of rounded
-    /// boxes.
+    /// it moves towards, the one it is farthest beyond. None at the centre of a ball, and of
+    /// rounded boxes.
     pub(in crate::measure) fn normal(&self, line: &Line, s: f64) -> Option<Vector3<f64>> {
         let (y, v) = (line.at(s), &line.velocity);
         let entered = |beyond: f64, outwards: f64| if outwards < 0.0 { beyond } else { f64::NEG_INFINITY };

@@ -50,8 +50,9 @@ pub(in crate::measure) enum SignedShapes {
 }
 
 /// The signed distance of a ball and another shape, or of two boxes unless they are apart; none of
-/// others, and of boxes that face each other along none of their axes as far as is known. Directions at an angle with a cosine below
-/// `elsewhere` are others. From a point of A on, world frame.
+/// others, and of boxes that face each other along none of their axes as far as is known.
+/// Directions at an angle with a cosine below `elsewhere` are others. From a point of A on, world
+/// frame.
 pub(in crate::measure) fn signed_of_shapes(
     of_a: Placed<'_>,
     of_b: Placed<'_>,

@@ -2,7 +2,7 @@
 //! from the cheapest on.
 
 use super::active_set::{SupportPoint, SupportProgram};
-use super::lanes::FarthestOne;
+use super::lanes::{FarthestOne, FoundOne};
 use crate::body::Body;
 use crate::measure::frames::query_frame::Posed;
 use crate::measure::options::Options;
@@ -31,7 +31,8 @@ pub(in crate::measure) struct Height {
 pub(in crate::measure) struct Asked {
     /// Largest width of its bracket, metres.
     pub(in crate::measure) tolerance: f64,
-    /// Largest angle between the direction and the normal at the point of a smooth surface, radians.
+    /// Largest angle between the direction and the normal at the point of a smooth surface,
+    /// radians.
     pub(in crate::measure) angle: f64,
 }
 
@@ -64,7 +65,7 @@ pub(in crate::measure) fn height(
     }
     let known = known.filter(|known| known.x.iter().all(|v| v.is_finite()));
     let center = &body.normalization().center;
-    let mut spent = 0;
+    let (mut known, mut spent) = (known, 0);
     if runs(Stage::SupportLanes) {
         // Of bodies with edges the constraint is followed that is known to be active alone.
         let is_single = |known: &SupportPoint| body.is_smooth() || known.active.count_ones() == 1;
@@ -75,18 +76,11 @@ pub(in crate::measure) fn height(
                 (known.x - center, active)
             });
             let (found, rounds) = dispatch(FarthestOne { body, n: *n, from, tolerance, angle });
-            if let Some(found) = found {
-                let along = n.dot(&found.x);
-                let trust = body.trust();
-                let slack = trust.rounding * trust.reach + TAYLOR_ROUNDING * found.x.norm();
-                return Height {
-                    lower: along - slack,
-                    upper: along + found.deficit + slack,
-                    point: center + found.x,
-                    active: 1 << found.active,
-                    iterations: rounds,
-                };
-            }
+            let end = match found {
+                Ok(found) => return followed(body, n, &found, rounds),
+                Err(end) => end,
+            };
+            known = end.filter(|_| body.is_smooth()).map(|x| SupportPoint::at((center + x, 0))).or(known);
             spent = rounds;
         }
     }
@@ -111,5 +105,18 @@ pub(in crate::measure) fn height(
         point,
         active: found.point.active,
         iterations: spent + found.iterations,
+    }
+}
+
+/// The height that one constraint proves, after so many evaluations.
+fn followed(body: &Body, n: &Vector3<f64>, found: &FoundOne, iterations: u32) -> Height {
+    let (along, trust) = (n.dot(&found.x), body.trust());
+    let slack = trust.rounding * trust.reach + TAYLOR_ROUNDING * found.x.norm();
+    Height {
+        lower: along - slack,
+        upper: along + found.deficit + slack,
+        point: body.normalization().center + found.x,
+        active: 1 << found.active,
+        iterations,
     }
 }

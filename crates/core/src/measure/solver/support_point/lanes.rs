@@ -45,8 +45,8 @@ pub(super) struct FarthestOne<'a> {
     pub(super) body: &'a Body,
     /// The unit vector, body frame.
     pub(super) n: Vector3<f64>,
-    /// Where to begin, from the centre of the normalization on, and the constraint active there; the
-    /// table of the body where there is none.
+    /// Where to begin, from the centre of the normalization on, and the constraint active there;
+    /// the table of the body where there is none.
     pub(super) from: Option<(Vector3<f64>, usize)>,
     /// Largest support deficit of the point, metres.
     pub(super) tolerance: f64,
@@ -65,8 +65,9 @@ pub(super) struct FoundOne {
 }
 
 impl WithSimd for FarthestOne<'_> {
-    /// The point, if it is found, and after how many evaluations.
-    type Output = (Option<FoundOne>, u32);
+    /// The point, or how far the search came, from the centre of the normalization on, if it may go
+    /// on from there; and after how many evaluations.
+    type Output = (Result<FoundOne, Option<Vector3<f64>>>, u32);
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -81,7 +82,9 @@ impl WithSimd for FarthestOne<'_> {
         );
         let (x, deficit, rounds) = farthest(simd, (body, active), start, n, [tolerance, angle]);
         let holds = deficit <= tolerance && Side::at_home(simd, body, active).others_hold(simd, x);
-        (holds.then(|| FoundOne { x: x.into(), deficit, active }), rounds)
+        // Flat surfaces take more steps than that; what ends earlier has diverged.
+        let end = (rounds == MAX_ROUNDS && deficit == f64::INFINITY).then(|| Vector3::from(x));
+        (if holds { Ok(FoundOne { x: x.into(), deficit, active }) } else { Err(end) }, rounds)
     }
 }
 
@@ -145,7 +148,7 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
 
 /// The point farthest along unit vectors n, from a start, as far as one constraint goes, with a
 /// bound of its support deficit, infinite where it is not proven to be within the tolerance and the
-/// angle asked for; and the number of evaluations.
+/// angle asked for: then it is the last one; and the number of evaluations.
 #[inline(always)]
 fn farthest<S: Simd, N: Number<S>>(
     simd: S,
@@ -186,6 +189,10 @@ fn farthest<S: Simd, N: Number<S>>(
         if N::all(simd, open.le(zero)) {
             break;
         }
+    }
+    let missing = N::splat(simd, f64::MAX).le(deficit);
+    for i in 0..3 {
+        best[i] = x[i].select(missing, best[i]);
     }
     (best, deficit, rounds)
 }
