@@ -4,9 +4,13 @@
 use nalgebra::Vector3;
 use sublevel_core::body::{Body, Compound};
 use sublevel_core::measure::{
-    Capsule, Distance, HalfSpace, Options, Pose, Ray, Status, WarmStart, cast_ray, distance, distance_batch,
-    distance_of_capsules, distance_to_capsule, distance_to_half_space, distance_to_point, growth_distance,
-    level_distance, nearer_than, overlap, overlap_with_capsule, signed_distance,
+    Capsule, CapsuleDistance, Distance, HalfSpace, ImpactOptions, Motion, Options, Pose, Ray, Status, Sweep, WarmStart,
+    capsules_nearer_than, capsules_within_margin, cast_ball, cast_ray, distance, distance_batch,
+    distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_capsule_batch,
+    distance_to_half_space, distance_to_point, growth_distance, is_solved_in_lanes, level_distance, nearer_than,
+    nearer_to_capsule_than, nearer_to_half_space_than, overlap, overlap_of_capsules, overlap_with_capsule,
+    overlap_with_half_space, penetration, signed_distance, time_of_impact, translation_hessian, within_margin,
+    within_margin_of_capsule,
 };
 use sublevel_testkit::Seeded;
 use sublevel_testkit::bodies::{cut, cylinder};
@@ -136,7 +140,8 @@ fn a_solve_allocates_nothing() {
     }
 }
 
-/// Neither do those of other measures and kinds of bodies, apart, near and in overlap.
+/// Neither do those of other measures and kinds of bodies, apart, near and in overlap, of compounds
+/// as well.
 #[test]
 fn no_kind_of_query_allocates() {
     let (chair, _) = fitted()[2];
@@ -153,6 +158,12 @@ fn no_kind_of_query_allocates() {
         let mut random = Seeded(4000 + seed);
         let (pose_a, pose_b) = (random.pose(0.0), random.pose(0.1 + 0.04 * seed as f64));
         let ray = Ray::new(*pose_b.translation(), random.unit(), 10.0).unwrap();
+        let sweep = Sweep::new(ray, 0.05).unwrap();
+        let still = Motion::still(pose_a);
+        // Towards the other, turning, for a second.
+        let velocity = pose_a.translation() - pose_b.translation();
+        let moving = Motion::new(pose_b, velocity, random.unit(), *pose_b.translation()).unwrap();
+        let second = ImpactOptions::new(1.0).unwrap();
         let counted = |name: &str, query: &mut dyn FnMut(&mut WarmStart)| {
             let mut warm = WarmStart::default();
             let counted = allocation_counter::measure(|| {
@@ -174,6 +185,9 @@ fn no_kind_of_query_allocates() {
                 counted(&name("threshold"), &mut |warm| {
                     nearer_than(a, &pose_a, b, &pose_b, 0.3, &options, warm).unwrap();
                 });
+                counted(&name("margin"), &mut |warm| {
+                    within_margin(a, &pose_a, b, &pose_b, 0.3, &options, warm).unwrap();
+                });
                 counted(&name("level distance"), &mut |warm| {
                     level_distance(a, &pose_a, b, &pose_b, &options, warm);
                 });
@@ -183,27 +197,138 @@ fn no_kind_of_query_allocates() {
                 counted(&name("signed distance"), &mut |warm| {
                     signed_distance(a, &pose_a, b, &pose_b, &options, warm);
                 });
+                counted(&name("penetration"), &mut |warm| {
+                    penetration(a, &pose_a, b, &pose_b, &options, warm);
+                });
+                counted(&name("time of impact"), &mut |_| {
+                    time_of_impact(a, &still, b, &moving, &second);
+                });
+                counted(&name("Hessian"), &mut |warm| {
+                    let found = distance(a, &pose_a, b, &pose_b, &options, warm);
+                    translation_hessian(a, &pose_a, b, &pose_b, &found);
+                });
             }
             counted(&format!("capsule and {of_a}"), &mut |warm| {
                 distance_to_capsule(a, &pose_a, &capsule, &pose_b, &options, warm);
                 overlap_with_capsule(a, &pose_a, &capsule, &pose_b, &options, warm);
+                nearer_to_capsule_than(a, &pose_a, &capsule, &pose_b, 0.3, &options, warm).unwrap();
+                within_margin_of_capsule(a, &pose_a, &capsule, &pose_b, 0.3, &options, warm).unwrap();
             });
             counted(&format!("point and {of_a}"), &mut |warm| {
                 distance_to_point(a, &pose_a, pose_b.translation(), &options, warm).unwrap();
             });
             counted(&format!("half-space and {of_a}"), &mut |warm| {
                 distance_to_half_space(a, &pose_b, &plane, &options, warm);
+                overlap_with_half_space(a, &pose_b, &plane, &options, warm);
+                nearer_to_half_space_than(a, &pose_b, &plane, 0.3, &options, warm).unwrap();
             });
             counted(&format!("ray and {of_a}"), &mut |_| {
                 cast_ray(a, &pose_a, &ray, &options);
             });
+            counted(&format!("moving ball and {of_a}"), &mut |_| {
+                cast_ball(a, &pose_a, &sweep, &options);
+            });
             counted(&format!("pile and {of_a}"), &mut |warm| {
                 distance(&pile, &pose_a, a, &pose_b, &options, warm);
                 overlap(&pile, &pose_a, a, &pose_b, &options, warm);
+                nearer_than(&pile, &pose_a, a, &pose_b, 0.3, &options, warm).unwrap();
+                within_margin(&pile, &pose_a, a, &pose_b, 0.3, &options, warm).unwrap();
+                level_distance(&pile, &pose_a, a, &pose_b, &options, warm);
+                growth_distance(&pile, &pose_a, a, &pose_b, &options, warm);
             });
         }
         counted("capsules", &mut |_| {
             distance_of_capsules(&capsule, &pose_a, &capsule, &pose_b, &options);
+            overlap_of_capsules(&capsule, &pose_a, &capsule, &pose_b);
+            capsules_nearer_than(&capsule, &pose_a, &capsule, &pose_b, 0.3).unwrap();
+            capsules_within_margin(&capsule, &pose_a, &capsule, &pose_b, 0.3, &options).unwrap();
+        });
+        counted("capsule and half-space", &mut |_| {
+            distance_of_capsule_to_half_space(&capsule, &pose_b, &plane, &options);
+        });
+        counted("pile and capsule", &mut |warm| {
+            distance_to_capsule(&pile, &pose_a, &capsule, &pose_b, &options, warm);
+            overlap_with_capsule(&pile, &pose_a, &capsule, &pose_b, &options, warm);
+            nearer_to_capsule_than(&pile, &pose_a, &capsule, &pose_b, 0.3, &options, warm).unwrap();
+            within_margin_of_capsule(&pile, &pose_a, &capsule, &pose_b, 0.3, &options, warm).unwrap();
+        });
+        counted("pile and point", &mut |warm| {
+            distance_to_point(&pile, &pose_a, pose_b.translation(), &options, warm).unwrap();
+        });
+        counted("pile and half-space", &mut |warm| {
+            distance_to_half_space(&pile, &pose_b, &plane, &options, warm);
+            overlap_with_half_space(&pile, &pose_b, &plane, &options, warm);
+            nearer_to_half_space_than(&pile, &pose_b, &plane, 0.3, &options, warm).unwrap();
+        });
+        counted("pile, ray and moving ball", &mut |_| {
+            cast_ray(&pile, &pose_a, &ray, &options);
+            cast_ball(&pile, &pose_a, &sweep, &options);
+        });
+        counted("pile and pile", &mut |warm| {
+            distance(&pile, &pose_a, &pile, &pose_b, &options, warm);
+            overlap(&pile, &pose_a, &pile, &pose_b, &options, warm);
+        });
+        // Depths of compounds take a search of all directions for each pair of parts.
+        if seed % 8 == 0 {
+            counted("depths of piles", &mut |warm| {
+                signed_distance(&pile, &pose_a, &pile, &pose_b, &options, warm);
+                penetration(&pile, &pose_a, &pile, &pose_b, &options, warm);
+            });
+            counted("time of impact of piles", &mut |_| {
+                time_of_impact(&pile, &still, &pile, &moving, &second);
+            });
+        }
+    }
+}
+
+/// Nor do batches: in lanes beside each other and beside shapes, pose by pose, of compounds, and
+/// those of capsules.
+#[test]
+fn no_batch_allocates() {
+    let (chair, human) = fitted()[2];
+    let crate_ = Body::cuboid("crate", Vector3::new(0.3, 0.2, 0.25)).unwrap();
+    let (can, sliced) = (cylinder(0.25, 0.3), cut(0.3, 0.4, 0.2));
+    let balls = [0.2, 0.3].map(|radius| Body::ball("ball", Vector3::zeros(), radius).unwrap());
+    let beside = can.moved(&Default::default(), &Vector3::new(0.7, 0.0, 0.0)).unwrap();
+    let pile = Compound::new("pile", vec![crate_.clone(), beside]).unwrap();
+    let capsule = Capsule::new(0.1, 0.3).unwrap();
+    let options = Options::default();
+    let lanes = [(chair, human), (chair, &crate_), (&can, chair), (chair, &balls[0]), (&balls[0], &balls[1])];
+    let alone = [(&crate_, &can), (&sliced, chair), (&sliced, &sliced)];
+    for (a, b) in lanes {
+        assert!(is_solved_in_lanes(a, b), "{} and {}", a.name(), b.name());
+    }
+    for (a, b) in alone {
+        assert!(!is_solved_in_lanes(a, b), "{} and {}", a.name(), b.name());
+    }
+    for seed in 0..10 {
+        let mut random = Seeded(5000 + seed);
+        let pose_a = random.pose(0.0);
+        // From overlap to apart.
+        let poses: Vec<Pose> = (0..40).map(|k| random.pose(0.05 * f64::from(k))).collect();
+        let mut answers = vec![Distance::default(); poses.len()];
+        let mut of_capsules = vec![CapsuleDistance::default(); poses.len()];
+        let counted = |name: &str, query: &mut dyn FnMut()| {
+            let counted = allocation_counter::measure(query);
+            assert_eq!(counted.count_total, 0, "{name}, seed {seed}");
+        };
+        for (a, b) in lanes.into_iter().chain(alone) {
+            counted(&format!("{} and {}", a.name(), b.name()), &mut || {
+                distance_batch(a, &pose_a, b, &poses, &options, &mut answers).expect("as many places");
+            });
+        }
+        counted("pile and chair", &mut || {
+            distance_batch(&pile, &pose_a, chair, &poses, &options, &mut answers).expect("as many places");
+        });
+        for body in [chair, human, &crate_, &can, &sliced, &balls[0]] {
+            counted(&format!("capsule and {}", body.name()), &mut || {
+                distance_to_capsule_batch(body, &[pose_a], &capsule, &poses, &options, &mut of_capsules)
+                    .expect("as many places");
+            });
+        }
+        counted("capsule and pile", &mut || {
+            distance_to_capsule_batch(&pile, &poses, &capsule, &[pose_a], &options, &mut of_capsules)
+                .expect("as many places");
         });
     }
 }

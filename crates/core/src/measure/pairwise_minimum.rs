@@ -44,7 +44,8 @@ pub(in crate::measure) struct Least<T> {
     pub(in crate::measure) best: T,
     /// The parts that `best` is about.
     pub(in crate::measure) parts: (usize, usize),
-    /// Proven lower bound of all.
+    /// Proven lower bound of all; after an early end with an upper bound that meets the goal, of
+    /// those that were looked at only.
     pub(in crate::measure) lower: f64,
     /// Whether the bracket of another pair meets that of the best: it may be the least as well.
     pub(in crate::measure) tied: bool,

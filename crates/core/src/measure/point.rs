@@ -16,12 +16,13 @@ use crate::measure::frames::query_frame::Posed;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{At, Least, bracketed, nearest_part};
-use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart};
 use crate::measure::solver::exact_shape::{
     ExactQuery, PointOffset, PointSide, direction_to_world, offset_of_point, to_world,
 };
-use crate::measure::solver::projection::{Objective, Segment, Single, SingleProblem, Trial, Worth, solve_single};
+use crate::measure::solver::projection::{
+    Objective, Segment, Single, SingleProblem, Start, Trial, Worth, solve_single,
+};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
@@ -258,15 +259,17 @@ impl<'a> Projection<'a> {
         let objective = Objective::Nearest(q);
         let is_point = q.half_axis == Vector3::zeros();
         let mut common = None;
-        let (start, active): (_, ActiveSet) = match warm.hint {
-            Hint::Single { y, active } if y.iter().all(|value| value.is_finite()) => (single.body_to_query(&y), active),
-            _ => (single.table(&objective), 0),
+        let start = match warm.hint {
+            Hint::Single { y, active } if y.iter().all(|value| value.is_finite()) => {
+                Start { y: single.body_to_query(&y), active }
+            }
+            _ => Start { y: single.table(&objective), active: 0 },
         };
         let (mut lower, mut upper, mut plane, mut witness) = (0.0_f64, f64::INFINITY, Vector3::zeros(), body.interior);
         let mut facing: Option<(f64, Vector3<f64>)> = None;
         let narrow = tolerance / unit;
         let in_metres = |bound: f64, side: f64| bound * unit * (1.0 + side * 4.0 * f64::EPSILON);
-        let problem = SingleProblem { body, objective: &objective, start, active, narrow };
+        let problem = SingleProblem { body, objective: &objective, start, other: None, narrow };
         let stop = |count| options.exhausted(spent + count);
         let (iterations, active) = solve_single(&problem, stop, |trial| {
             let (bound, n) = separation(body, &q, error, trial);

@@ -7,7 +7,9 @@ use std::cell::Cell;
 use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use sublevel_core::measure::{
-    Decision, Options, Status, WarmStart, nearer_than, nearer_to_capsule_than, overlap, overlap_with_capsule,
+    Decision, Options, Status, WarmStart, WithinMargin, capsules_nearer_than, capsules_within_margin, nearer_than,
+    nearer_to_capsule_than, nearer_to_half_space_than, overlap, overlap_of_capsules, overlap_with_capsule,
+    overlap_with_half_space, within_margin, within_margin_of_capsule,
 };
 use sublevel_testkit::catalogue::derivatives::GAPS;
 use sublevel_testkit::catalogue::limits::LIMITS;
@@ -51,39 +53,26 @@ fn cold(pair: &Pair, label: &str) -> (Solved, Reference) {
     judged(pair, &mut WarmStart::default(), label)
 }
 
-/// Overlap, and thresholds on both sides of the distance: as the truth is, or undecided so near to
-/// it that rounding hides it.
+/// Overlap, and thresholds and margins on both sides of the distance: as the truth is, or undecided
+/// so near to it that rounding hides it.
 fn decided(pair: &Pair, truth: &Reference, label: &str) {
-    let (options, value) = (pair.options(), truth.value());
-    let decide = |threshold: Option<f64>| {
-        let warm = &mut WarmStart::default();
-        let (pose_a, pose_b) = (&pair.pose_a, &pair.pose_b);
-        Some(match (&pair.a, &pair.b, threshold) {
-            (Shape::Body(a), Shape::Body(b), None) => overlap(&**a, pose_a, &**b, pose_b, &options, warm),
-            (Shape::Body(a), Shape::Body(b), Some(t)) => {
-                nearer_than(&**a, pose_a, &**b, pose_b, t, &options, warm).expect("a threshold")
-            }
-            (Shape::Body(a), Shape::Capsule(c), None) => overlap_with_capsule(&**a, pose_a, c, pose_b, &options, warm),
-            (Shape::Capsule(c), Shape::Body(b), None) => overlap_with_capsule(&**b, pose_b, c, pose_a, &options, warm),
-            (Shape::Body(a), Shape::Capsule(c), Some(t)) => {
-                nearer_to_capsule_than(&**a, pose_a, c, pose_b, t, &options, warm).expect("a threshold")
-            }
-            (Shape::Capsule(c), Shape::Body(b), Some(t)) => {
-                nearer_to_capsule_than(&**b, pose_b, c, pose_a, t, &options, warm).expect("a threshold")
-            }
-            _ => return None,
-        })
-    };
+    let value = truth.value();
+    // Bodies first, as the library takes them.
+    let is_first = matches!(pair.a, Shape::Body(_)) || !matches!(pair.b, Shape::Body(_));
+    let pair = &if is_first { pair.clone() } else { pair.clone().swapped() };
     let (a, b) = (pair.pose_a.translation(), pair.pose_b.translation());
     let size = pair.sum() + (a - b).norm();
+    // A half-space is known by its height over the origin of the world.
+    let is_plane = matches!(pair.b, Shape::HalfSpace);
+    let height = if is_plane { 256.0 * f64::EPSILON * a.norm().max(b.norm()) } else { 0.0 };
     // What thresholds may be within of the distance and undecided.
-    let slack = pair.accuracy * pair.size() + pair.floor + 1e-12 * size;
+    let slack = pair.accuracy * pair.size() + pair.floor + 1e-12 * size + height;
     for offset in [None, Some(0.5), Some(-0.5), Some(1e-3), Some(-1e-3), Some(1e-6), Some(-1e-6)] {
         let threshold = offset.map(|offset| value.max(0.0) + offset * pair.size());
         if threshold.is_some_and(|threshold| threshold <= 0.0) {
             continue;
         }
-        let (Some(decision), at) = (decide(threshold), threshold.unwrap_or(0.0)) else { return };
+        let (Some(decision), at) = (decide(pair, threshold), threshold.unwrap_or(0.0)) else { return };
         let label = format!("{decision:?} at {threshold:?}, {label}");
         match decision {
             Decision::Yes => assert!(value < at || offset.is_none() && value <= 0.0, "{label}"),
@@ -94,7 +83,68 @@ fn decided(pair: &Pair, truth: &Reference, label: &str) {
                 assert!(pair.limit.is_some() || is_flat || (value - at).abs() <= slack, "{label}");
             }
         }
+        match threshold.and_then(|margin| within(pair, margin)) {
+            None => {}
+            Some(WithinMargin::Beyond { lower }) => assert!(lower > at && lower <= value, "{label}: beyond {lower:e}"),
+            Some(WithinMargin::Within(found)) => {
+                let width = found.upper - found.lower;
+                let is_narrow = width <= pair.accuracy * pair.size() * (1.0 + 1e-12);
+                let label = format!("{label}: {found:?}");
+                assert!(found.lower <= at && truth.inside(&found), "{label}");
+                assert!(is_narrow || found.status != Status::Converged, "{label}");
+                // How deep an axis is in a body is not measured.
+                let is_deep = found.lower == f64::NEG_INFINITY;
+                assert!(pair.limit.is_some() || is_narrow || is_deep || width <= slack, "{label}");
+            }
+        }
     }
+}
+
+/// Whether the distance of a pair is below a threshold, metres, or whether the two overlap; none of
+/// points, and of capsules beside half-spaces, of which there are distances only.
+fn decide(pair: &Pair, threshold: Option<f64>) -> Option<Decision> {
+    let (options, warm) = (&pair.options(), &mut WarmStart::default());
+    let (pose_a, pose_b) = (&pair.pose_a, &pair.pose_b);
+    let decision = match (&pair.a, &pair.b, threshold) {
+        (Shape::Body(a), Shape::Body(b), None) => Ok(overlap(&**a, pose_a, &**b, pose_b, options, warm)),
+        (Shape::Body(a), Shape::Body(b), Some(t)) => nearer_than(&**a, pose_a, &**b, pose_b, t, options, warm),
+        (Shape::Body(a), Shape::Capsule(c), None) => Ok(overlap_with_capsule(&**a, pose_a, c, pose_b, options, warm)),
+        (Shape::Body(a), Shape::Capsule(c), Some(t)) => {
+            nearer_to_capsule_than(&**a, pose_a, c, pose_b, t, options, warm)
+        }
+        (Shape::Body(a), Shape::HalfSpace, None) => {
+            Ok(overlap_with_half_space(&**a, pose_a, &Shape::half_space(pose_b), options, warm))
+        }
+        (Shape::Body(a), Shape::HalfSpace, Some(t)) => {
+            Ok(nearer_to_half_space_than(&**a, pose_a, &Shape::half_space(pose_b), t, options, warm).expect("finite"))
+        }
+        (Shape::Capsule(a), Shape::Capsule(b), None) => Ok(overlap_of_capsules(a, pose_a, b, pose_b)),
+        (Shape::Capsule(a), Shape::Capsule(b), Some(t)) => capsules_nearer_than(a, pose_a, b, pose_b, t),
+        _ => return None,
+    };
+    Some(decision.expect("a threshold"))
+}
+
+/// The distance of a pair unless it exceeds a margin, metres; none of points and half-spaces.
+fn within(pair: &Pair, margin: f64) -> Option<WithinMargin<Solved>> {
+    let (options, warm) = (&pair.options(), &mut WarmStart::default());
+    let (pose_a, pose_b) = (&pair.pose_a, &pair.pose_b);
+    let of_capsule = match (&pair.a, &pair.b) {
+        (Shape::Body(a), Shape::Body(b)) => {
+            let found = within_margin(&**a, pose_a, &**b, pose_b, margin, options, warm).expect("a margin");
+            return Some(match found {
+                WithinMargin::Within(found) => WithinMargin::Within(Solved::of_bodies(&found, pose_a, pose_b)),
+                WithinMargin::Beyond { lower } => WithinMargin::Beyond { lower },
+            });
+        }
+        (Shape::Body(a), Shape::Capsule(c)) => within_margin_of_capsule(&**a, pose_a, c, pose_b, margin, options, warm),
+        (Shape::Capsule(a), Shape::Capsule(b)) => capsules_within_margin(a, pose_a, b, pose_b, margin, options),
+        _ => return None,
+    };
+    Some(match of_capsule.expect("a margin") {
+        WithinMargin::Within(found) => WithinMargin::Within(Solved::of_capsules(&found, pose_a, pose_b)),
+        WithinMargin::Beyond { lower } => WithinMargin::Beyond { lower },
+    })
 }
 
 /// Gradients, where there are any, are those of 200 bits; whether there are any.
@@ -137,8 +187,9 @@ fn family_01_kissing_primitives() {
             let (found, truth) = cold(&pair, &label);
             assert!(found.value >= last - 1e-12, "{label} {}: {found:?} after {last:e}", pair.what);
             last = found.value;
-            if let (Some(n), Some(_)) = (found.normal, truth.normal) {
-                let axis = pair.pose_b.translation().normalize();
+            // Where a segment lies in the plane of a half-space, both have one origin.
+            let axis = pair.pose_b.translation().try_normalize(0.0);
+            if let (Some(n), Some(_), Some(axis)) = (found.normal, truth.normal, axis) {
                 let allowed = 1e-6 + pair.turn_of_rounding(&truth);
                 assert!((n + axis).norm() <= allowed, "{label} {}: {found:?}", pair.what);
             }
@@ -262,7 +313,7 @@ fn family_12_needles_and_plates_of_primitives() {
 fn family_13_parallel_flats_of_primitives() {
     // A segment over a flat of degree 8, tilted by 1e-10 to 1e-6, at accuracies of 1e-12 and finer:
     // 4e-12 to 4e-11 m wide.
-    const WIDE: [u64; 9] = [1707, 1736, 1765, 1968, 1997, 2026, 2229, 2258, 2287];
+    const WIDE: [u64; 9] = [1823, 1854, 1885, 2102, 2133, 2164, 2381, 2412, 2443];
     each(0..PARALLEL_FLATS, |index| {
         let pair = parallel_flats(index);
         if WIDE.contains(&index) {

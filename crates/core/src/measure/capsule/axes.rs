@@ -99,7 +99,8 @@ fn less_radii([lower, upper]: [f64; 2], a: &Axis, b: &Axis) -> [f64; 2] {
 pub(super) fn bounds_of_axes(a: &Axis, b: &Axis, goal: &StopCriterion) -> [f64; 2] {
     let (between, error) = between_middles(a, b);
     let apart = between.norm();
-    let by_balls = less_radii([apart - a.half - b.half - error, apart + error], a, b);
+    let gap_of_balls = apart - a.half - b.half - error;
+    let by_balls = less_radii([gap_of_balls, apart + error], a, b);
     if goal.met(by_balls[0], by_balls[1]) {
         return by_balls;
     }
@@ -111,7 +112,7 @@ pub(super) fn bounds_of_axes(a: &Axis, b: &Axis, goal: &StopCriterion) -> [f64; 
     let way = between + u * s - v * t;
     let length = way.norm();
     // Not along a way that is all rounding, or of no length.
-    let gap = if length > error { gap_along(&(way / length), &between, a, b) - error } else { by_balls[0] };
+    let gap = if length > error { gap_along(&(way / length), &between, a, b) - error } else { gap_of_balls };
     less_radii([gap, length + error], a, b)
 }
 

@@ -20,7 +20,7 @@ pub struct HalfSpaceDistance {
     /// The point of the body nearest to the half-space, or deepest in it.
     pub witness: Vector3<f64>,
     /// Whether another part may lie as low, their brackets meeting: witness and gradient may then
-    /// jump. Never for single bodies.
+    /// jump. Of a capsule: its axis lies along the plane. Never for single bodies.
     pub tied: bool,
     /// Iterations.
     pub iterations: u32,

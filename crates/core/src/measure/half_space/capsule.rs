@@ -15,7 +15,8 @@ use nalgebra::Vector3;
 /// rounding: all of its points are as near then.
 ///
 /// The bracket is that of rounding; the status says whether it is as narrow as `options` ask,
-/// relative to the larger one of the capsule's reach, `r + h`, and 1e-3 of its place.
+/// relative to the largest of the capsule's reach, `r + h`, and 1e-3 of how far its place and the
+/// plane are from the origin.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -41,9 +42,9 @@ pub fn distance_of_capsule_to_half_space(
     let size = pose.translation().norm() + capsule.reach_m() + offset.abs();
     let slack = (ROTATION_ERROR + gamma(16)) * size;
     let (lower, upper) = (height - slack, height + slack);
-    let reach = if capsule.reach_m() > 0.0 { capsule.reach_m() } else { pose.translation().norm() };
+    let large = capsule.reach_m().max(1e-3 * pose.translation().norm().max(offset.abs()));
     HalfSpaceDistance {
-        status: Status::of(upper - lower <= options.accuracy() * reach),
+        status: Status::of(upper - lower <= options.accuracy() * large),
         lower,
         upper,
         witness: end - normal * capsule.radius_m(),

@@ -7,10 +7,15 @@ use super::solid::distance_until;
 use crate::body::Solid;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
-use crate::measure::overlap::{Decision, ThresholdError, check, decision};
+use crate::measure::overlap::{Decision, decision};
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
+
+/// A threshold that no signed distance can be compared with.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{0} m is not a signed distance to compare with; give a finite number")]
+pub struct SignedThresholdError(pub f64);
 
 /// Whether a solid at `pose` has a point in common with a half-space; the bracket of an open answer
 /// is that of the signed distance. `warm` as in
@@ -68,8 +73,10 @@ pub fn nearer_to_half_space_than(
     threshold: f64,
     options: &Options<'_>,
     warm: &mut WarmStart,
-) -> Result<Decision, ThresholdError> {
-    check(threshold.abs())?;
+) -> Result<Decision, SignedThresholdError> {
+    if !threshold.is_finite() {
+        return Err(SignedThresholdError(threshold));
+    }
     // Below the threshold is at most the number before it.
     Ok(decide((solid, pose), half_space, threshold.next_down(), options, warm))
 }

@@ -16,7 +16,7 @@ mod solid;
 
 pub use answer::HalfSpaceDistance;
 pub use capsule::distance_of_capsule_to_half_space;
-pub use decision::{nearer_to_half_space_than, overlap_with_half_space};
+pub use decision::{SignedThresholdError, nearer_to_half_space_than, overlap_with_half_space};
 pub use set::{HalfSpace, HalfSpaceError};
 
 use crate::body::Solid;

@@ -73,30 +73,35 @@ impl Ask<'_> {
         };
         let mut spent = 0;
         let mut start = known;
+        let mut proven = [f64::NEG_INFINITY, f64::INFINITY];
         if !goal.is_narrow() && body.closed_form().is_none() {
             // Balls around and inside, then the table of heights.
             let (outer, inner) = (body.circumscribed(), body.growth_ball());
-            let upper = above.of(&inner.center, inner.radius)[1];
-            let mut lower = above.of(&outer.center, outer.radius)[0];
-            if !goal.met(lower, upper) {
-                lower = lower.max(above.of(body.interior_point(), body.height(&above.down))[0]);
+            proven = [above.of(&outer.center, outer.radius)[0], above.of(&inner.center, inner.radius)[1]];
+            if !goal.met(proven[0], proven[1]) {
+                proven[0] = proven[0].max(above.of(body.interior_point(), body.height(&above.down))[0]);
             }
-            if goal.met(lower, upper) {
-                return answer([lower, upper], &inner.center, 0);
+            if goal.met(proven[0], proven[1]) {
+                return answer(proven, &inner.center, 0);
             }
             let asked = Asked::within(ROUGH * outer.radius);
             let rough = height(body, &above.down, asked, known, options);
-            let [lower, upper] = above.bracket(&rough);
-            if goal.met(lower, upper) {
+            proven = both(proven, above.bracket(&rough));
+            if goal.met(proven[0], proven[1]) {
                 *warm = Hint::Single { y: rough.point, active: rough.active }.into();
-                return answer([lower, upper], &rough.point, rough.iterations);
+                return answer(proven, &rough.point, rough.iterations);
             }
             (start, spent) = (Some(SupportPoint { x: rough.point, active: rough.active }), rough.iterations);
         }
         let found = height(body, &above.down, Asked::narrow(tolerance), start, &options.after(spent));
         *warm = Hint::Single { y: found.point, active: found.active }.into();
-        answer(above.bracket(&found), &found.point, spent + found.iterations)
+        answer(both(proven, above.bracket(&found)), &found.point, spent + found.iterations)
     }
+}
+
+/// What two brackets of one number prove together.
+fn both([least, most]: [f64; 2], [lower, upper]: [f64; 2]) -> [f64; 2] {
+    [least.max(lower), most.min(upper)]
 }
 
 /// Heights above the plane, of points of one body where it stands.

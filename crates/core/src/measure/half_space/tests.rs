@@ -3,9 +3,11 @@
 use super::*;
 use crate::body::{Body, Compound};
 use crate::measure::capsule::Capsule;
-use crate::measure::overlap::{Decision, ThresholdError};
+use crate::measure::half_space::SignedThresholdError;
+use crate::measure::overlap::Decision;
 use crate::measure::solver::stages::{Stage, except};
 use crate::measure::status::Status;
+use crate::measure::tests::edges::slab;
 use crate::measure::tests::{random_pose, zoo};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
@@ -147,7 +149,37 @@ fn decisions_agree_with_the_distance() {
             &Options::default(),
             &mut WarmStart::default(),
         );
-        assert!(matches!(asked, Err(ThresholdError(_))), "{wrong}: {asked:?}");
+        assert!(matches!(asked, Err(SignedThresholdError(_))), "{wrong}: {asked:?}");
+    }
+}
+
+/// Hints of bodies of more constraints, of none of their own and of nonsense change no answer.
+#[test]
+fn hints_of_other_bodies_do_no_harm() {
+    let cut = |slabs: usize| {
+        let mut random = Seeded(400 + slabs as u64);
+        let round = Body::superellipsoid("cut", Vector3::zeros(), Vector3::new(1.0, 0.8, 0.6), 6).unwrap();
+        let cuts = (0..slabs).map(|_| slab(&(random.unit() / 0.7), 0.2 * random.signed()));
+        let constraints = round.constraints().iter().cloned().chain(cuts).collect();
+        Body::new("cut", *round.normalization(), constraints).unwrap()
+    };
+    // The last has as many constraints as a body may have.
+    let bodies = [cut(1), cut(4), cut(15)];
+    let options = Options::default();
+    for seed in 0..200 {
+        let mut random = Seeded(410 + seed);
+        let half_space = HalfSpace::new(random.unit(), random.signed()).unwrap();
+        let pose = random_pose(&mut random, 1.0);
+        for first in &bodies {
+            for second in &bodies {
+                let mut warm = WarmStart::default();
+                distance_to_half_space(first, &pose, &half_space, &options, &mut warm);
+                let found = distance_to_half_space(second, &pose, &half_space, &options, &mut warm);
+                let cold = distance_to_half_space(second, &pose, &half_space, &options, &mut WarmStart::default());
+                assert!(found.lower <= cold.upper && cold.lower <= found.upper, "seed {seed}: {found:?} {cold:?}");
+                assert_eq!(found.status, Status::Converged, "seed {seed}: {found:?}");
+            }
+        }
     }
 }
 

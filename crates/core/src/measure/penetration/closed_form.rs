@@ -5,7 +5,7 @@ use crate::body::{Body, ClosedForm};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
-use crate::measure::solver::depth::local_search::{ELSEWHERE, shape_tolerance};
+use crate::measure::solver::depth::local_search::{ELSEWHERE, solid_tolerance};
 use crate::measure::solver::exact_shape::{SignedShapes, signed_of_shapes};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -42,7 +42,7 @@ pub(super) fn of_shapes(
         SignedShapes::Signed(found) => found,
     };
     let (lower, upper) = ((-found.upper).max(0.0), (-found.lower).max(0.0));
-    let tolerance = shape_tolerance(a, b, options, upper);
+    let tolerance = solid_tolerance(a, b, options, upper);
     let tied = upper > 0.0 && found.elsewhere <= upper + 2.0 * tolerance;
     if upper - lower > tolerance || upper > 0.0 && !(found.is_aligned || tied) {
         return None;

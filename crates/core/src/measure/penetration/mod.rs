@@ -11,7 +11,8 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{Least, nearest};
 use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
-use crate::measure::signed::separating_translation::{self, Start, Starts, narrow};
+use crate::measure::signed::separating_translation::{self, Start, Starts};
+use crate::measure::solver::depth::local_search::solid_tolerance;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
@@ -80,7 +81,7 @@ pub fn penetration(
     }
     let found = separating_translation::separate((a, pose_a), (b, pose_b), &starts, best.lower, options);
     let (lower, upper) = (best.lower, found.length);
-    let narrow = upper - lower <= narrow(a, b, upper, options);
+    let narrow = upper - lower <= solid_tolerance(a, b, options, upper);
     Penetration {
         status: Status::of(narrow),
         lower,

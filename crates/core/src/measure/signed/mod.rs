@@ -22,12 +22,13 @@ use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::{Least, nearest};
 use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
+use crate::measure::solver::depth::local_search::solid_tolerance;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 pub use answer::SignedDistance;
 use pair::between;
-use separating_translation::{Contact, SeparatingTranslation, Start, Starts, narrow};
+use separating_translation::{Contact, SeparatingTranslation, Start, Starts};
 
 /// Signed distance of body `a` at `pose_a` and body `b` at `pose_b` (body to world).
 ///
@@ -87,13 +88,13 @@ pub fn signed_distance(
     });
     let Least { best, lower, tied, iterations, .. } = found;
     if lower > 0.0 || starts.is_empty() {
-        let status = Status::of(best.upper - lower <= narrow(a, b, 0.0, options));
+        let status = Status::of(best.upper - lower <= solid_tolerance(a, b, options, 0.0));
         return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };
     }
     let least = (-best.upper).max(0.0);
     let found = separating_translation::separate((a, pose_a), (b, pose_b), &starts, least, options);
     let (lower, upper) = (-found.length, best.upper);
-    let narrow = upper - lower <= narrow(a, b, if upper < 0.0 { found.length } else { 0.0 }, options);
+    let narrow = upper - lower <= solid_tolerance(a, b, options, if upper < 0.0 { found.length } else { 0.0 });
     SignedDistance {
         status: Status::of(narrow),
         lower,

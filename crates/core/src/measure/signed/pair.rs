@@ -26,13 +26,14 @@ pub(super) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> SignedDistance {
-    if runs(Stage::ClosedForm)
-        && let Some(found) = of_shapes((a, pose_a), (b, pose_b), options, warm)
-    {
-        return found;
+    let mut spent = 0;
+    if runs(Stage::ClosedForm) {
+        match of_shapes((a, pose_a), (b, pose_b), options, warm) {
+            Ok(found) => return found,
+            Err(iterations) => spent = iterations,
+        }
     }
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint
         && runs(Stage::Follow)
     {
@@ -43,8 +44,8 @@ pub(super) fn between(
                 let [x, y, normal] = proven.world(Scalar, a, pose_a);
                 return Answer::of(&proven).report((x, y), Some(normal), pose_a, pose_b);
             }
-            Ok(proven) => spent = proven.rounds,
-            Err(lost) => spent = lost.rounds,
+            Ok(proven) => spent += proven.rounds,
+            Err(lost) => spent += lost.rounds,
         }
     }
     let pair = Pair::new(a, pose_a, b, pose_b);

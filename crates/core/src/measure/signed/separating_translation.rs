@@ -18,6 +18,7 @@ use crate::measure::half_space::{HalfSpace, distance_to_half_space};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::part_pairs::{NodeBound, TreePair, ball_gaps, nodes, only_node};
+use crate::measure::solver::depth::local_search::solid_tolerance;
 use crate::measure::solver::min_norm_point::{Bound, Shortest, shortest};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
@@ -126,7 +127,7 @@ pub(in crate::measure) fn separate(
     let radius = |parts: &[Body]| parts.iter().map(|part| part.circumscribed().radius).fold(0.0, f64::max);
     // Gaps are to be provable whatever accuracy the caller asks for.
     let options = asked.with_accuracy(asked.accuracy().min(1e-9)).unwrap_or(*asked);
-    let narrow = |depth: f64| narrow(a, b, depth, asked);
+    let narrow = |depth: f64| solid_tolerance(a, b, asked, depth);
     let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
     let mut search = Search {
         a: a.parts(),
@@ -397,10 +398,4 @@ impl Planes {
             *widest = plane;
         }
     }
-}
-
-/// Width of the bracket of a depth that is asked for, metres.
-pub(in crate::measure) fn narrow(a: &impl Solid, b: &impl Solid, depth: f64, options: &Options<'_>) -> f64 {
-    let radius = a.circumscribed().radius.min(b.circumscribed().radius);
-    (options.depth_accuracy() * depth).max(options.accuracy() * radius)
 }

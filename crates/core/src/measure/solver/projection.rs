@@ -156,21 +156,28 @@ pub(in crate::measure) struct Trial {
 /// Most steps of [`solve_single`] before, and after each iterate of, the interior-point method.
 const MAX_STEPS: u32 = 12;
 
-/// Longest step, in query units, after which a bracket of a fraction of its square may be narrow:
-/// it is as long where more is asked for.
+/// Brackets are computed after steps, in query units, shorter than this or the root of the width
+/// asked for, whichever is longer: brackets are about as wide as the square of the step.
 ///
 /// Larger, brackets are computed that stay wide; smaller, a step more is taken. It changes time
 /// only; no test pins it.
 const WORTH_A_BRACKET: f64 = 1e-3;
 
-/// A minimisation over one body from a start, with the constraints that may be active there.
+/// A point to begin at, with the constraints that may be active there; none, if nothing is known.
+#[derive(Clone, Copy)]
+pub(in crate::measure) struct Start {
+    pub(in crate::measure) y: Vector3<f64>,
+    pub(in crate::measure) active: ActiveSet,
+}
+
+/// A minimisation over one body from a start.
 #[derive(Clone, Copy)]
 pub(in crate::measure) struct SingleProblem<'a> {
     pub(in crate::measure) body: &'a Posed<'a>,
     pub(in crate::measure) objective: &'a Objective,
-    pub(in crate::measure) start: Vector3<f64>,
-    /// None, if nothing is known.
-    pub(in crate::measure) active: ActiveSet,
+    pub(in crate::measure) start: Start,
+    /// Where to begin again if that leads nowhere, before the interior-point method.
+    pub(in crate::measure) other: Option<Start>,
     /// Width of the bracket asked for, query units.
     pub(in crate::measure) narrow: f64,
 }
@@ -197,15 +204,18 @@ const MORE_STEPS: u32 = 3;
 /// Minimises until `judge` has all that it asks for; returns the iterations and the constraints
 /// that were active last.
 pub(in crate::measure) fn solve_single(
-    &SingleProblem { body, objective, start, active, narrow }: &SingleProblem<'_>,
+    &SingleProblem { body, objective, start, other, narrow }: &SingleProblem<'_>,
     mut exhausted: impl FnMut(u32) -> bool,
     mut judge: impl FnMut(&Trial) -> Worth,
 ) -> (u32, ActiveSet) {
     let worth = WORTH_A_BRACKET.max(narrow.sqrt());
-    let mut steps = Steps { body, objective, active, worth, narrow: 0 };
+    let mut steps = Steps { body, objective, active: 0, worth, narrow: 0 };
     let mut count = 0;
-    if steps.run(start, &mut count, &mut exhausted, &mut judge) {
-        return (count, steps.active);
+    for Start { y, active } in [Some(start), other].into_iter().flatten() {
+        steps.active = active;
+        if steps.run(y, &mut count, &mut exhausted, &mut judge) {
+            return (count, steps.active);
+        }
     }
     if exhausted(count) || !runs(Stage::ProjectionInterior) {
         return (count, steps.active);
@@ -305,7 +315,8 @@ impl Steps<'_> {
         let mut multipliers = [0.0; MAX_CONSTRAINTS];
         let aim = self.objective.pull(y);
         let most = (0..jets.len()).max_by(|&i, &j| jets[i].value.total_cmp(&jets[j].value)).unwrap_or(0);
-        if self.active == 0 || self.active >> jets.len() != 0 || self.active.count_ones() > MAX_ACTIVE as u32 {
+        if self.active == 0 || u32::from(self.active) >> jets.len() != 0 || self.active.count_ones() > MAX_ACTIVE as u32
+        {
             self.active = 1 << most;
         }
         let share = aim.norm() / f64::from(self.active.count_ones());

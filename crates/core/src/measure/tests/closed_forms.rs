@@ -107,7 +107,8 @@ fn rays_enter_shapes() {
         let body = shape(&mut random, seed % 3, scale(seed));
         let size = body.circumscribed().radius;
         let pose = random_pose(&mut random, (size * [0.0, 1.0, 1e3][(seed % 3) as usize]).min(FARTHEST));
-        let ray = ray(&mut random, body, &pose, seed, 0.0);
+        let past = if seed.is_multiple_of(7) { 1.5 * size } else { 0.0 };
+        let ray = ray(&mut random, body, &pose, seed, past);
         let ask = || cast_ray(body, &pose, &ray, &Options::default());
         let (found, general) = (only(&[Stage::ClosedForm], ask), except(&[Stage::ClosedForm], ask));
         let label = format!("seed {seed} {}: {ray:?}", body.name());

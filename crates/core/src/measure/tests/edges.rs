@@ -11,7 +11,7 @@ use sublevel_testkit::Seeded;
 
 /// The constraint `(1 - ε) (a·z - b)² + ε |z|² <= 1`: a slab that bulges by so little that its
 /// Hessian is just positive definite.
-fn slab(a: &Vector3<f64>, b: f64) -> Constraint {
+pub(in crate::measure) fn slab(a: &Vector3<f64>, b: f64) -> Constraint {
     let (share, round) = (1.0 - 1e-6, 1e-6);
     let hessian = (a * a.transpose() * share + Matrix3::identity() * round) * 2.0;
     let exponents = |v: Vector3<u8>| -> Exponents { v.into() };

@@ -1,6 +1,6 @@
 //! The shortest known translation that takes overlapping bodies apart.
 
-use crate::body::Body;
+use crate::body::Solid;
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, DualTrial, descent};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
@@ -84,14 +84,16 @@ const ROUGHLY: f64 = 0.01;
 /// Most rounds of that search.
 const MOST_ROUNDS: u32 = 24;
 
-/// Width of a bracket asked for, in query units.
+/// Width of a bracket asked for, in query units; finite even where no depth is known, so that an
+/// infinite bracket is never narrow.
 pub(in crate::measure) fn tolerance(pair: &Pair<'_>, options: &Options<'_>, depth: f64) -> f64 {
-    (options.depth_accuracy() * depth).max(pair.tolerance(options.accuracy()))
+    (options.depth_accuracy() * depth.min(f64::MAX)).max(pair.tolerance(options.accuracy()))
 }
 
-/// The same in metres.
-pub(in crate::measure) fn shape_tolerance(a: &Body, b: &Body, options: &Options<'_>, depth: f64) -> f64 {
-    (options.depth_accuracy() * depth).max(options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius))
+/// The same of two solids, metres.
+pub(in crate::measure) fn solid_tolerance(a: &impl Solid, b: &impl Solid, options: &Options<'_>, depth: f64) -> f64 {
+    let radius = a.circumscribed().radius.min(b.circumscribed().radius);
+    (options.depth_accuracy() * depth.min(f64::MAX)).max(options.accuracy() * radius)
 }
 
 /// Rigorous upper bound of f(n), the depth along n, from multipliers for -n of A and for n of B as

@@ -83,15 +83,16 @@ fn outside<P: Projectable>(set: &P, radius: f64, y: V3<f64>, elsewhere: f64) -> 
     }
     let n = set.in_normal_cone(Scalar, seen.feature, seen.frame[2]);
     // Faces are flat, but walls, edges and corners have normals all around.
-    let [k, _, l] = seen.curvature;
-    let is_round = k + l > 0.0;
+    let [k, m, l] = seen.curvature;
+    let most = 0.5 * (k + l) + (0.5 * (k - l)).hypot(m);
+    let is_round = most > 0.0;
     Some(Beside {
         lower: set.separation(Scalar, n, (y, 0.0)) - radius,
         upper: seen.distance - radius,
         n,
         nearest: add_scaled::<Scalar, f64>(set.project(Scalar, y), radius, n),
         elsewhere: if is_round { radius - elsewhere * seen.distance } else { f64::INFINITY },
-        arm: if is_round { 1.0 / k.max(l) } else { f64::INFINITY },
+        arm: if is_round { 1.0 / most } else { f64::INFINITY },
     })
 }
 

@@ -1,10 +1,10 @@
 //! Support points of bodies of any number of constraints: the convex program over one body, with a
-//! bracket of the height at every step that is worth one.
+//! bracket of the height after every step that is short enough.
 
 use crate::measure::bounds::duality_bounds::{DUALITY_ROUNDING, descent};
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::solver::active_constraints::ActiveSet;
-use crate::measure::solver::projection::{Objective, SingleProblem, Worth, solve_single};
+use crate::measure::solver::projection::{Objective, SingleProblem, Start, Worth, solve_single};
 use nalgebra::Vector3;
 
 /// A point within whose displacement a point of the body lies, with the constraints that are active
@@ -33,7 +33,17 @@ pub(super) struct SupportProgram<'a> {
     pub(super) direction: Vector3<f64>,
     /// Where to begin, and what may be active there; nothing where its active set is empty.
     pub(super) start: SupportPoint,
+    /// Where to begin again if that leads nowhere.
+    pub(super) other: Option<SupportPoint>,
 }
+
+/// Width of a bracket, query units, that is not far from what rounding leaves of any: more is
+/// asked of a few steps more, and not of the interior-point method.
+///
+/// Larger, heights of flat sides stay wide that could be narrow; smaller, tighter accuracies cost
+/// an interior-point method for each direction. It changes time only below the rounding floor of
+/// `Options::with_accuracy`.
+const FLOOR: f64 = 64.0 * DUALITY_ROUNDING;
 
 /// Bracket of `max r·v` over the points v of a body; query units.
 #[derive(Clone, Copy, Debug)]
@@ -49,11 +59,13 @@ impl SupportProgram<'_> {
     /// a number of iterations. The point is the best one that is proven inside; where there is none
     /// the lower bound is minus infinity.
     pub(super) fn solve(&self, narrow: f64, exhausted: impl FnMut(u32) -> bool) -> Supported {
-        let Self { body, direction: r, start } = *self;
+        let Self { body, direction: r, start, other } = *self;
         let (mut lower, mut upper) = (f64::NEG_INFINITY, r.dot(&body.interior) + body.reach(&body.interior));
         let mut point = body.interior;
         let objective = Objective::Farthest(r);
-        let problem = SingleProblem { body, objective: &objective, start: start.x, active: start.active, narrow };
+        let begin = |from: SupportPoint| Start { y: from.x, active: from.active };
+        let (start, other) = (begin(start), other.map(begin));
+        let problem = SingleProblem { body, objective: &objective, start, other, narrow };
         let (iterations, active) = solve_single(&problem, exhausted, |trial| {
             let multipliers = trial.multipliers.map(|m| m.max(0.0));
             let rise = descent(body, &trial.y, &-r, &multipliers);
@@ -69,7 +81,11 @@ impl SupportProgram<'_> {
                     (lower, point) = (attained, y);
                 }
             }
-            if upper - lower <= narrow { Worth::Done } else { Worth::Wide }
+            match upper - lower {
+                width if width <= narrow => Worth::Done,
+                width if width <= FLOOR => Worth::Narrow,
+                _ => Worth::Wide,
+            }
         });
         Supported { lower, upper, point: SupportPoint { x: point, active }, iterations }
     }
@@ -90,8 +106,7 @@ pub(in crate::measure) fn support_of_a(
     tolerance: f64,
     known: Option<SupportPoint>,
 ) -> Option<SupportPoint> {
-    let start = known.unwrap_or_else(|| SupportPoint::at(pair.farthest_a(n)));
-    SupportProgram { body: &pair.a, direction: *n, start }.point(tolerance)
+    support(&pair.a, n, tolerance, known, SupportPoint::at(pair.farthest_a(n)))
 }
 
 /// The same of B.
@@ -101,6 +116,16 @@ pub(in crate::measure) fn support_of_b(
     tolerance: f64,
     known: Option<SupportPoint>,
 ) -> Option<SupportPoint> {
-    let start = known.unwrap_or_else(|| SupportPoint::at(pair.farthest_b(n)));
-    SupportProgram { body: &pair.b, direction: *n, start }.point(tolerance)
+    support(&pair.b, n, tolerance, known, SupportPoint::at(pair.farthest_b(n)))
+}
+
+fn support(
+    body: &Posed<'_>,
+    n: &Vector3<f64>,
+    tolerance: f64,
+    known: Option<SupportPoint>,
+    of_table: SupportPoint,
+) -> Option<SupportPoint> {
+    let (start, other) = (known.unwrap_or(of_table), known.map(|_| of_table));
+    SupportProgram { body, direction: *n, start, other }.point(tolerance)
 }

@@ -63,7 +63,9 @@ pub(in crate::measure) fn height(
         let [lower, upper] = form.heights(n);
         return Height { lower, upper, point: form.support_point(n), active: 0, iterations: 0 };
     }
-    let known = known.filter(|known| known.x.iter().all(|v| v.is_finite()));
+    // Hints may be those of other bodies.
+    let is_of_body = |active: ActiveSet| u32::from(active) >> body.constraints().len() == 0;
+    let known = known.filter(|known| known.x.iter().all(|v| v.is_finite()) && is_of_body(known.active));
     let center = &body.normalization().center;
     let (mut known, mut spent) = (known, 0);
     if runs(Stage::SupportLanes) {
@@ -75,7 +77,8 @@ pub(in crate::measure) fn height(
                 let active = if body.is_smooth() { 0 } else { known.active.trailing_zeros() as usize };
                 (known.x - center, active)
             });
-            let (found, rounds) = dispatch(FarthestOne { body, n: *n, from, tolerance, angle });
+            let limit = options.max_iterations();
+            let (found, rounds) = dispatch(FarthestOne { body, n: *n, from, tolerance, angle, limit });
             let end = match found {
                 Ok(found) => return followed(body, n, &found, rounds),
                 Err(end) => end,
@@ -87,9 +90,10 @@ pub(in crate::measure) fn height(
     let ball = body.circumscribed();
     let unit = ball.radius.log2().round().exp2();
     let own = Posed::own(body, unit);
-    let start = known.unwrap_or_else(|| SupportPoint::at(body.farthest_in_table(n)));
-    let start = SupportPoint { x: (start.x - ball.center) / unit, ..start };
-    let program = SupportProgram { body: &own, direction: *n, start };
+    let of_table = SupportPoint::at(body.farthest_in_table(n));
+    let seen = |from: SupportPoint| SupportPoint { x: (from.x - ball.center) / unit, ..from };
+    let (start, other) = (seen(known.unwrap_or(of_table)), known.map(|_| seen(of_table)));
+    let program = SupportProgram { body: &own, direction: *n, start, other };
     let found = program.solve(tolerance / unit, |count| options.exhausted(spent + count));
     // From the centre of the ball, where the query frame is, to that of the normalization.
     let shift = n.dot(&(ball.center - center));

@@ -52,6 +52,8 @@ pub(super) struct FarthestOne<'a> {
     pub(super) tolerance: f64,
     /// Largest angle between n and the normal at the point, radians.
     pub(super) angle: f64,
+    /// Most evaluations; no more than [`MAX_ROUNDS`] are made.
+    pub(super) limit: u32,
 }
 
 /// A point within whose displacement one of the body is proven to lie, with the constraint that is
@@ -71,7 +73,7 @@ impl WithSimd for FarthestOne<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { body, n, from, tolerance, angle } = self;
+        let Self { body, n, from, tolerance, angle, limit } = self;
         let n: V3<f64> = n.into();
         let (start, active) = from.map_or_else(
             || {
@@ -80,10 +82,12 @@ impl WithSimd for FarthestOne<'_> {
             },
             |(x, active)| (x.into(), active),
         );
-        let (x, deficit, rounds) = farthest(simd, (body, active), start, n, [tolerance, angle]);
+        let limit = limit.min(MAX_ROUNDS);
+        let (x, deficit, rounds) = farthest(simd, (body, active), start, n, [tolerance, angle], limit);
         let holds = deficit <= tolerance && Side::at_home(simd, body, active).others_hold(simd, x);
         // Flat surfaces take more steps than that; what ends earlier has diverged.
-        let end = (rounds == MAX_ROUNDS && deficit == f64::INFINITY).then(|| Vector3::from(x));
+        let is_open = rounds == limit && deficit == f64::INFINITY && x.iter().all(|v| v.is_finite());
+        let end = is_open.then(|| Vector3::from(x));
         (if holds { Ok(FoundOne { x: x.into(), deficit, active }) } else { Err(end) }, rounds)
     }
 }
@@ -108,7 +112,7 @@ impl WithSimd for Farthest<'_> {
                 let cell = body.outline().cell(simd, n);
                 let active = body.outline().active(cell.place);
                 let asked = [sought.tolerance, f64::INFINITY];
-                let (x, deficit, _) = farthest(simd, (body, active), cell.farthest(simd, n), n, asked);
+                let (x, deficit, _) = farthest(simd, (body, active), cell.farthest(simd, n), n, asked, MAX_ROUNDS);
                 let holds = deficit <= sought.tolerance && Side::at_home(simd, body, active).others_hold(simd, x);
                 *found = holds.then(|| (x.into(), active));
             }
@@ -136,7 +140,7 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
     let n = [x, y, z];
     let start = body.outline().cell(simd, n).farthest(simd, n);
     let asked = [tolerance, Lanes::<S>::splat(simd, f64::INFINITY)];
-    let (x, deficit, _) = farthest(simd, (body, 0), start, n, asked);
+    let (x, deficit, _) = farthest(simd, (body, 0), start, n, asked, MAX_ROUNDS);
     for (number, column) in [x[0], x[1], x[2], deficit].into_iter().zip(&mut columns) {
         number.store(column);
     }
@@ -148,7 +152,7 @@ fn in_lanes<S: Simd>(simd: S, body: &Body, sought: &[Sought], found: &mut [Optio
 
 /// The point farthest along unit vectors n, from a start, as far as one constraint goes, with a
 /// bound of its support deficit, infinite where it is not proven to be within the tolerance and the
-/// angle asked for: then it is the last one; and the number of evaluations.
+/// angle asked for: then it is the last one; and the number of evaluations, at most the limit.
 #[inline(always)]
 fn farthest<S: Simd, N: Number<S>>(
     simd: S,
@@ -156,6 +160,7 @@ fn farthest<S: Simd, N: Number<S>>(
     start: V3<N>,
     n: V3<N>,
     [tolerance, angle]: [N; 2],
+    limit: u32,
 ) -> (V3<N>, N, u32) {
     let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
     let side = Side::at_home(simd, body, active);
@@ -165,7 +170,7 @@ fn farthest<S: Simd, N: Number<S>>(
     let axes = side.localize(simd, &[[one, zero, zero], [zero, one, zero], [zero, zero, one]]);
     let (mut best, mut deficit, mut open) = (x, N::splat(simd, f64::INFINITY), one);
     let mut rounds = 0;
-    while rounds < MAX_ROUNDS {
+    while rounds < limit {
         rounds += 1;
         let (jet, inside) = side.jet(simd, x);
         let (dz, useful) = step(simd, &jet, e);

@@ -1,7 +1,7 @@
 //! Stages of penetration depths and signed distances.
 
 use super::{Case, Found, at_least, catalogue, solved};
-use crate::measure::solver::stages::{Stage, only};
+use crate::measure::solver::stages::{Stage, except, only};
 use crate::measure::*;
 use sublevel_testkit::Seeded;
 
@@ -15,20 +15,20 @@ fn depth(case: &Case, pose: &Pose, warm: &mut WarmStart) -> Penetration {
     penetration(case.a, &case.poses[0], case.b, pose, &Options::default(), warm)
 }
 
-/// From the poses alone, with these stages, beside all of them.
+/// From the poses alone, with these stages, beside all searches.
 fn cold(case: &Case, stages: &[Stage]) -> Found {
     let pose = &case.poses[1];
     let found = only(stages, || depth(case, pose, &mut WarmStart::default()));
-    let all = depth(case, pose, &mut WarmStart::default());
+    let all = except(&[Stage::ClosedForm], || depth(case, pose, &mut WarmStart::default()));
     (found.status, [found.lower, found.upper], [all.lower, all.upper])
 }
 
-/// From the hint of all stages at the pose before.
+/// From the hint of all searches at the pose before: closed forms have other ones.
 fn warm(case: &Case, stages: &[Stage]) -> Found {
     let (mut warm, next) = (WarmStart::default(), moved(case));
-    depth(case, &case.poses[1], &mut warm);
+    except(&[Stage::ClosedForm], || depth(case, &case.poses[1], &mut warm));
     let found = only(stages, || depth(case, &next, &mut warm));
-    let all = depth(case, &next, &mut WarmStart::default());
+    let all = except(&[Stage::ClosedForm], || depth(case, &next, &mut WarmStart::default()));
     (found.status, [found.lower, found.upper], [all.lower, all.upper])
 }
 
