@@ -18,8 +18,9 @@ use super::placing::Placing;
 use super::planes::{Height, Tangent, gap};
 use super::problem::MotionProblem;
 
-/// The format that is written and read.
-pub(crate) const FORMAT: &str = "sublevel motion certificate 1";
+/// The format that is written and read. Floating joints moved along lines in the first, and move as
+/// screws in this one: its paths are other curves.
+pub(crate) const FORMAT: &str = "sublevel motion certificate 2";
 
 /// What all formats of certificates begin with.
 const FAMILY: &str = "sublevel motion certificate";

@@ -2,8 +2,9 @@
 
 use nalgebra::Vector3;
 use sublevel_core::measure::{
-    ActiveConstraints, Capsule, CapsuleDistance, HalfSpace, Options, Pose, WarmStart, distance, distance_of_capsules,
-    distance_to_capsule, distance_to_half_space, signed_distance,
+    ActiveConstraints, CapsuleDistance, HalfSpace, HalfSpaceDistance, Options, Pose, WarmStart, distance,
+    distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_half_space,
+    signed_distance,
 };
 
 use super::geometry::Piece;
@@ -58,17 +59,11 @@ pub(crate) fn solve(
         (Piece::Capsule(_), Piece::Body(_)) => turned(solve((b, pose_b), (a, pose_a), depth, options, warm)),
         (Piece::Capsule(a), Piece::Capsule(b)) => of_capsule(&distance_of_capsules(a, pose_a, b, pose_b, options)),
         (Piece::Body(a), Piece::HalfSpace(b, error_m)) => {
-            let found = distance_to_half_space(*a, pose_a, b, options, warm);
-            let below = found.witness - b.normal() * found.upper;
-            Solved {
-                lower: found.lower - error_m,
-                upper: found.upper + error_m,
-                normal: Some(*b.normal()),
-                witnesses: [found.witness, below],
-                active: Default::default(),
-            }
+            of_half_space(&distance_to_half_space(*a, pose_a, b, options, warm), b, *error_m)
         }
-        (Piece::Capsule(a), Piece::HalfSpace(b, error_m)) => of_capsule_above((a, pose_a), b, *error_m),
+        (Piece::Capsule(a), Piece::HalfSpace(b, error_m)) => {
+            of_half_space(&distance_of_capsule_to_half_space(a, pose_a, b, options), b, *error_m)
+        }
         // No robot is made of half-spaces.
         (Piece::HalfSpace(..), Piece::HalfSpace(..)) => Solved {
             lower: f64::NEG_INFINITY,
@@ -86,16 +81,16 @@ fn of_capsule(found: &CapsuleDistance) -> Solved {
     Solved { lower: found.lower, upper: found.upper, normal: found.normal, witnesses, active: Default::default() }
 }
 
-fn of_capsule_above((capsule, pose): (&Capsule, &Pose), half_space: &HalfSpace, error_m: f64) -> Solved {
-    let n = half_space.normal();
-    let axis = pose.transform_direction(&Vector3::z());
-    let end = pose.translation() - axis * (capsule.half_height_m() * axis.dot(n).signum());
-    let lowest = end - n * capsule.radius_m();
-    let value = n.dot(&lowest) - half_space.offset();
-    let size = pose.translation().norm() + capsule.reach_m() + half_space.offset().abs();
-    let error = error_m + 64.0 * f64::EPSILON * size;
-    let witnesses = [lowest, lowest - n * value];
-    Solved { lower: value - error, upper: value + error, normal: Some(*n), witnesses, active: Default::default() }
+/// Of a half-space whose plane is known up to an error, metres.
+fn of_half_space(found: &HalfSpaceDistance, half_space: &HalfSpace, error_m: f64) -> Solved {
+    let below = found.witness - half_space.normal() * found.upper;
+    Solved {
+        lower: (found.lower - error_m).next_down(),
+        upper: (found.upper + error_m).next_up(),
+        normal: Some(*half_space.normal()),
+        witnesses: [found.witness, below],
+        active: Default::default(),
+    }
 }
 
 fn turned(solved: Solved) -> Solved {
