@@ -64,13 +64,9 @@ impl Kind {
         matches!(self, Self::Ball | Self::Cuboid | Self::Cylinder | Self::Capsule)
     }
 
-    /// Whether it is the first of some pair.
+    /// Whether it is the first of some pair, and of all with those that come after it: two
+    /// half-spaces have no distance.
     pub(super) fn is_first(self) -> bool {
         self != Self::HalfSpace
-    }
-
-    /// Whether there is a measure of it beside this kind: of half-spaces there is one of bodies.
-    pub(super) fn pairs_with(self, other: Self) -> bool {
-        self.is_first() && (other != Self::HalfSpace || self != Self::Capsule)
     }
 }

@@ -57,8 +57,8 @@ pub fn pairs(
         models.push((kind, [Model::build(kind, &subjects[0], cache)?, Model::build(kind, &subjects[1], cache)?]));
     }
     let mut times = Vec::new();
-    for (i, (kind_a, [a, _])) in models.iter().enumerate() {
-        for (kind_b, [_, b]) in models[i..].iter().filter(|(kind_b, _)| kind_a.pairs_with(*kind_b)) {
+    for (i, (kind_a, [a, _])) in models.iter().enumerate().filter(|(_, (kind_a, _))| kind_a.is_first()) {
+        for (kind_b, [_, b]) in &models[i..] {
             announce(&format!("{} against {}", kind_a.name(), kind_b.name()))?;
             times.extend(race([*kind_a, *kind_b], [a, b], unit_m, &effort, (cache, coal.as_ref()))?);
         }

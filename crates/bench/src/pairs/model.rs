@@ -6,8 +6,9 @@ use parry3d_f64::shape::{HalfSpace as ParryHalfSpace, SharedShape};
 use sublevel::body::{Body, BodyError};
 use sublevel::fit::{FitOptions, ball};
 use sublevel::measure::{
-    Capsule, CapsuleDistance, Decision, HalfSpace, Options, Pose, Status, WarmStart, distance, distance_of_capsules,
-    distance_to_capsule, distance_to_half_space, overlap, overlap_with_capsule,
+    Capsule, CapsuleDistance, Decision, HalfSpace, HalfSpaceDistance, Options, Pose, Status, WarmStart, distance,
+    distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_half_space, overlap,
+    overlap_of_capsules, overlap_with_capsule, overlap_with_half_space,
 };
 
 use super::kind::Kind;
@@ -46,9 +47,8 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// Of a body from a half-space; there is no measure of capsules and half-spaces.
-    fn above(half_space: &HalfSpace, body: &Body, pose: &Pose, warm: &mut WarmStart) -> Self {
-        let found = distance_to_half_space(body, pose, half_space, &Options::default(), warm);
+    /// Of a shape from a half-space.
+    fn above(half_space: &HalfSpace, found: &HalfSpaceDistance) -> Self {
         Self {
             lower_m: found.lower,
             upper_m: found.upper,
@@ -171,10 +171,16 @@ impl Model {
                     iterations: found.iterations,
                 }
             }
-            (_, Form::HalfSpace(half_space, _)) => Found::above(half_space, self.body(), pose, warm),
+            (Form::Body(a), Form::HalfSpace(half_space, _)) => {
+                Found::above(half_space, &distance_to_half_space(&**a, pose, half_space, &options, warm))
+            }
+            (Form::Capsule(a, _), Form::HalfSpace(half_space, _)) => {
+                Found::above(half_space, &distance_of_capsule_to_half_space(a, pose, half_space, &options))
+            }
+            // Never the first of a pair: from what contains the other.
             (Form::HalfSpace(half_space, _), _) => {
-                let found = Found::above(half_space, other.body(), pose, warm);
-                Found { normal: found.normal.map(|n| -n), ..found }
+                let found = distance_to_half_space(other.body(), pose, half_space, &options, warm);
+                Found { normal: Some(-half_space.normal()), ..Found::above(half_space, &found) }
             }
             (Form::Body(a), Form::Capsule(b, _)) => {
                 Found::signed(&distance_to_capsule(&**a, &origin, b, pose, &options, warm))
@@ -189,8 +195,8 @@ impl Model {
         }
     }
 
-    /// Whether both overlap, from nothing but the pose; beside a half-space the sign of the
-    /// distance.
+    /// Whether both overlap, from nothing but the pose; of a capsule beside a half-space the sign
+    /// of the distance, which is a formula.
     #[inline]
     pub(super) fn overlap(&self, other: &Self, pose: &Pose) -> Answer {
         let (origin, options, warm) = (Pose::identity(), Options::default(), &mut WarmStart::default());
@@ -198,11 +204,11 @@ impl Model {
             (Form::Body(a), Form::Body(b)) => overlap(&**a, &origin, &**b, pose, &options, warm),
             (Form::Body(a), Form::Capsule(b, _)) => overlap_with_capsule(&**a, &origin, b, pose, &options, warm),
             (Form::Capsule(a, _), Form::Body(b)) => overlap_with_capsule(&**b, pose, a, &origin, &options, warm),
-            (Form::Capsule(a, _), Form::Capsule(b, _)) => {
-                let found = distance_of_capsules(a, &origin, b, pose, &options);
-                return Found::decision(found.lower, found.upper);
+            (Form::Capsule(a, _), Form::Capsule(b, _)) => overlap_of_capsules(a, &origin, b, pose),
+            (Form::Body(a), Form::HalfSpace(half_space, _)) => {
+                overlap_with_half_space(&**a, pose, half_space, &options, warm)
             }
-            (_, Form::HalfSpace(..)) | (Form::HalfSpace(..), _) => {
+            (Form::Capsule(..), Form::HalfSpace(..)) | (Form::HalfSpace(..), _) => {
                 let found = self.distance(other, pose, warm);
                 return Found::decision(found.lower_m, found.upper_m);
             }

@@ -110,7 +110,7 @@ pub(super) fn race(
     }
     let near = far.iter().map(|trajectory| brought_near((a, b), unit_m, trajectory)).collect::<Result<Vec<_>, _>>()?;
     let parry = Parry::new([a, b], [&far, &near])?;
-    let mut rows = vec![
+    let mut rows = [
         (
             Who::Ours,
             Question::Cold,
@@ -128,10 +128,6 @@ pub(super) fn race(
         (Who::Parry, Question::Near, Row::cold("", &parry.near, |pose| parry.overlap(pose))),
         (Who::Parry, Question::Apart, Row::cold("", &parry.far, |pose| parry.overlap(pose))),
     ];
-    if b.is_half_space() {
-        // Their decision is the sign of the distance.
-        rows.retain(|(_, question, _)| !matches!(question, Question::Near | Question::Apart));
-    }
     let name = format!("pairs-{}-{}", kinds[0].name(), kinds[1].name()).replace(' ', "-");
     let asked = coal.and_then(|coal| Some((coal, [a.coal()?, b.coal()?])));
     let mut run = asked.map(|(coal, shapes)| coal.start(cache.folder(), &name, shapes, &far)).transpose()?;

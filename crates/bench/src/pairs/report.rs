@@ -22,9 +22,9 @@ impl Pairs {
             "# Pairs by type\n\n{head}\nPeers: {coal}, parry3d-f64 {}.\n\n\
              Shapes of every kind about the chair (first) and the human (second) of the Princeton Mesh Segmentation Benchmark: \
              the smallest ball, fitted bodies of degree 2 (ellipsoids) to 8, bodies of degree 6 that six slabs cut, and a box, \
-             a cylinder and a capsule of about the size of the object; and half-spaces: of \
-             these there is only the distance of bodies above them, whose sign is the decision, turning and as far away as about the \
-             smallest ball of the human. Each pair has walks of its own in steps of a centimetre \
+             a cylinder and a capsule of about the size of the object; and half-spaces: the others turn above them, as far \
+             away as about the smallest ball of the human, and the decision of a capsule there is the sign of its distance. Two capsules, \
+             and a capsule above a half-space, have no use for a hint. Each pair has walks of its own in steps of a centimetre \
              and a degree, for objects of two metres, mostly 5 to 75 cm apart. A time is the median of five turns, in each of \
              which everybody walks the same poses nine times. Brackets are proven to 1e-9 of the smaller body.\n\n\
              ## Distance, from nothing but the poses (ns)\n\n{cold}\n\

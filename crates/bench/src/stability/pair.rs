@@ -57,17 +57,23 @@ fn of_ours(pair: &Pair, method: Method) -> Result<Option<PairAnswer>, CaseError>
 }
 
 /// Our answer to a pair that is none of bodies; none of methods that it has not: batches are of
-/// bodies, and pairs of capsules take no hint.
+/// bodies, and capsules beside each other or a half-space take no hint.
 pub(super) fn solved(pair: &Pair, method: Method) -> Option<Solved> {
     let mut warm = WarmStart::default();
     match method {
         Method::Cold => {}
-        Method::Warm if !matches!((&pair.a, &pair.b), (Shape::Capsule(_), Shape::Capsule(_))) => {
+        Method::Warm if takes_hints(pair) => {
             nearby(pair).solve(&pair.options(), &mut warm);
         }
         _ => return None,
     }
     Some(pair.solve(&pair.options(), &mut warm))
+}
+
+/// Whether the measure of a pair starts from a hint: closed forms of capsules have no use for one.
+fn takes_hints(pair: &Pair) -> bool {
+    let is_closed = |shape: &Shape| matches!(shape, Shape::Capsule(_) | Shape::HalfSpace);
+    !(is_closed(&pair.a) && is_closed(&pair.b))
 }
 
 /// A hundredth of the pair's size and half a degree before.

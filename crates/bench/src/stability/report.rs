@@ -150,7 +150,7 @@ impl Stability {
              half-spaces, each with most others and beside smooth bodies; ours are judged by 200 bits, and gradients compared with those. There GJK gets the \
              primitives themselves, parry all and coal all but points and half-spaces, which its program does not take, and hulls of ellipsoids and smooth bodies. \
              No polynomial has a capsule, a point or a half-space for its set: of those rows Newton, SLSQP and clarabel get the pairs of bodies. \
-             Batches are of bodies, and pairs of capsules take no hint. There is no 122 and no 126: of capsules no time of impact is measured, and fits are of points. \
+             Batches are of bodies, and capsules beside each other or a half-space take no hint. There is no 122 and no 126: of capsules no time of impact is measured, and fits are of points. \
              The tests of the families ask ours the same against references of 200 bits.\n\n\
              ## Failures\n\nThe first of each cell, by the command that replays it.\n\n",
         );

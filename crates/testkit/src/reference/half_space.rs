@@ -1,19 +1,20 @@
-//! The signed distance of a body from a half-space with 200 bits.
+//! The signed distance of a body or a capsule from a half-space with 200 bits.
 
 use super::active::{CLOSE, Trial, for_direction};
 use super::big::{Big, Vector, add, big, cross, dot, double, norm, scaled, solve, sub, vector};
+use super::segment::Segment;
 use super::solid::{Jet, Solid};
 use nalgebra::Vector3;
 use sublevel_core::body::Body;
-use sublevel_core::measure::{HalfSpace, Pose};
+use sublevel_core::measure::{Capsule, HalfSpace, Pose};
 
 /// The signed distance in a bracket of its own, metres.
 #[derive(Debug)]
 pub struct Truth {
     pub lower: Big,
     pub upper: Big,
-    /// Derivative with respect to the twist `(v, ω)` of the body about the translation of its pose;
-    /// one of several where a side lies flat.
+    /// Derivative with respect to the twist `(v, ω)` of the shape about the translation of its
+    /// pose; one of several where a side lies flat.
     pub gradient: [f64; 6],
 }
 
@@ -56,6 +57,24 @@ pub fn signed_distance((body, pose): (&Body, &Pose), half_space: &HalfSpace, wit
     Truth {
         lower: &best.lower * &metres + &base,
         upper: &best.upper * &metres + base,
+        gradient: std::array::from_fn(|i| double(if i < 3 { &n[i] } else { &turning[i - 3] })),
+    }
+}
+
+/// The least `n·x - offset` over the points of a capsule: at the lower end of its axis, a radius
+/// below it.
+pub fn signed_distance_of_capsule((capsule, pose): (&Capsule, &Pose), half_space: &HalfSpace) -> Truth {
+    let origin = pose.translation();
+    let axis = Segment::new(capsule.half_height_m(), pose, origin, 1.0);
+    let n = vector(half_space.normal());
+    let end = if dot(&n, &axis.axis) > Big::ZERO { axis.at(&-&axis.half) } else { axis.at(&axis.half) };
+    let below = big(half_space.offset()) + norm(&n) * big(capsule.radius_m());
+    let height = dot(&n, &end) + dot(&n, &vector(origin)) - below;
+    // The radius lies along the normal and turns nothing.
+    let turning = cross(&end, &n);
+    Truth {
+        lower: height.clone(),
+        upper: height,
         gradient: std::array::from_fn(|i| double(if i < 3 { &n[i] } else { &turning[i - 3] })),
     }
 }
@@ -132,8 +151,33 @@ fn raise(one: &Solid<'_>, n: &Vector, x: &Vector, best: &mut Best) {
 mod tests {
     use super::*;
     use crate::bodies::{b, c, cylinder, e, q, support};
-    use crate::random::Seeded;
+    use crate::random::{Seeded, twisted};
     use sublevel_core::measure::{Options, WarmStart, distance_to_half_space};
+
+    /// No point of a capsule is lower, and one is as low; the gradient is the difference quotient.
+    #[test]
+    fn a_capsule_is_as_low_as_the_lowest_of_its_points() {
+        for seed in 0..60 {
+            let mut random = Seeded(1000 + seed);
+            let radius = if seed % 3 == 0 { 0.0 } else { random.positive() };
+            let capsule = Capsule::new(radius, 2.0 * random.positive()).unwrap();
+            let (pose, n) = (random.pose(2.0), random.unit());
+            let half_space = HalfSpace::new(n, random.signed()).unwrap();
+            let found = signed_distance_of_capsule((&capsule, &pose), &half_space);
+            let height = |along: f64| {
+                let x = pose.transform_point(&(Vector3::z() * (along * capsule.half_height_m())));
+                half_space.normal().dot(&x) - half_space.offset() - radius
+            };
+            let least = (-50..=50).map(|k| height(f64::from(k) / 50.0)).fold(f64::INFINITY, f64::min);
+            assert!((found.value() - least).abs() < 2e-14 && found.width() == 0.0, "seed {seed}: {found:?} {least}");
+            for k in 0..6 {
+                let value =
+                    |h: f64| signed_distance_of_capsule((&capsule, &twisted(&pose, k, 0, h)), &half_space).value();
+                let slope = (value(1e-5) - value(-1e-5)) / 2e-5;
+                assert!((slope - found.gradient[k]).abs() < 1e-8, "seed {seed}, {k}: {slope} {:?}", found.gradient);
+            }
+        }
+    }
 
     #[test]
     fn heights_have_closed_forms() {

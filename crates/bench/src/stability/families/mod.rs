@@ -42,9 +42,9 @@ type Together = fn(&[(Question, Answer)], Method) -> Result<Verdict, CaseError>;
 /// All rows, in the order of the catalogue.
 pub(super) const FAMILIES: [Family; 46] = [
     row(1, [40, 360], Put::Distances(contact::kissing, contact::rising)),
-    of_primitives(101, [45, 135], primitives::kissing),
+    of_primitives(101, [47, 141], primitives::kissing),
     row(2, [30, 300], Put::Distance(limits::few_iterations)),
-    of_primitives(102, [32, 360], primitives::few_iterations),
+    of_primitives(102, [32, 376], primitives::few_iterations),
     row(3, [40, 80], Put::Distance(contact::parallel_faces)),
     of_primitives(103, [32, 640], primitives::parallel_faces),
     row(4, [10, 340], Put::Own(placement::far_apart)),
@@ -52,7 +52,7 @@ pub(super) const FAMILIES: [Family; 46] = [
     row(5, [60, 1000], Put::Distance(placement::common_point)),
     of_primitives(105, [32, 640], primitives::common_point),
     row(6, [60, 336], Put::Distance(placement::along_an_axis)),
-    of_primitives(106, [48, 630], primitives::along_an_axis),
+    of_primitives(106, [48, 658], primitives::along_an_axis),
     row(7, [40, 400], Put::Distances(placement::concentric, placement::defined)),
     of_primitives(107, [32, 512], primitives::concentric),
     row(8, [30, 300], Put::Own(contact::normal)),

@@ -69,7 +69,9 @@ pub(super) fn kissing(seed: u64, method: Method) -> Put {
             let Some(ours) = answer.ours else { continue };
             let truth = pair.reference(&ours);
             let (Some(n), Some(_)) = (ours.normal, truth.normal) else { continue };
-            let angle = (n + pair.pose_b.translation().normalize()).norm();
+            // Where a segment lies in the plane of a half-space, both have one origin.
+            let Some(axis) = pair.pose_b.translation().try_normalize(0.0) else { continue };
+            let angle = (n + axis).norm();
             if !(angle <= NORMAL + pair.turn_of_rounding(&truth)) {
                 return Verdict::Off(angle);
             }

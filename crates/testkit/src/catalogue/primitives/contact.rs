@@ -37,7 +37,8 @@ pub fn kissing(index: u64) -> Vec<Pair> {
         let bound = if is_flat { 1e-12 * (pair.a.reach_m().max(pair.b.reach_m()) + offset) } else { 1e-12 };
         Pair { accuracy: 1e-13, exact: Some(exact), bound: Some(bound), floor: 1e-12, ..pair }
     };
-    // Segments side by side are apart whatever the sign.
+    // Segments side by side are apart whatever the sign, and the origin of one in a half-space
+    // would lie behind the other one.
     let is_flat = offset == 0.0;
     gaps(offset.max(0.5)).into_iter().filter(|gap| !is_flat || *gap >= 0.0).map(case).collect()
 }
@@ -95,6 +96,8 @@ impl Flat {
         [Self::Roller, Self::Smooth],
         [Self::Disc, Self::Capsule],
         [Self::Roller, Self::Disc],
+        [Self::HalfSpace, Self::Capsule],
+        [Self::HalfSpace, Self::Segment],
     ];
 
     fn make(self, [x, y, z]: [f64; 3]) -> (Shape, UnitQuaternion<f64>, f64) {
@@ -123,7 +126,7 @@ impl Flat {
 }
 
 /// Pairs of flat and straight sides.
-const FLATS: u64 = 29;
+const FLATS: u64 = 31;
 
 /// Cases of [`parallel_faces`]: all pairs, 10 gaps at 11 tilts.
 pub const PARALLEL_FACES: u64 = FLATS * 10 * 11;
@@ -206,8 +209,8 @@ pub fn tips(index: u64, random: &mut dyn Draws) -> Option<Pair> {
         3 => (Shape::of_sizes(Kind::Cut, [1.0, 1.0, 0.1]), 0.06),
         _ => (Shape::of_sizes(Kind::Smooth, [1.0, 1.0, 0.1]), 0.1),
     };
-    // Capsules and points are not measured against half-spaces.
-    if matches!((&tip, &flat), (Shape::Capsule(_) | Shape::Point, Shape::HalfSpace)) {
+    // The distance of a point from a half-space is not among the measures.
+    if matches!((&tip, &flat), (Shape::Point, Shape::HalfSpace)) {
         return None;
     }
     let gap = [1e-9, 1e-6, 1e-3, 0.3][(index / 45 % 4) as usize];

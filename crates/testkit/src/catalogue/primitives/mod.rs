@@ -22,7 +22,7 @@ pub use solved::{Reference, Solved};
 use sublevel_core::measure::Pose;
 
 /// The pairs that measures are defined for, each with both orders.
-pub const PAIRS: [[Kind; 2]; 45] = {
+pub const PAIRS: [[Kind; 2]; 47] = {
     use Kind::{Ball, Capsule, Cuboid, Cut, Cylinder, Ellipsoid, HalfSpace, Point, Segment, Smooth};
     // The first of them have every primitive.
     [
@@ -71,6 +71,8 @@ pub const PAIRS: [[Kind; 2]; 45] = {
         [Point, Ball],
         [Segment, Ball],
         [HalfSpace, Ellipsoid],
+        [HalfSpace, Capsule],
+        [HalfSpace, Segment],
     ]
 };
 

@@ -84,8 +84,7 @@ pub fn needles(index: u64, random: &mut dyn Draws) -> Option<Pair> {
         8 => of(Kind::Cut, [1.0, 1.0, thin]),
         _ => Shape::Point,
     };
-    let is_body = matches!(first, Shape::Body(_));
-    if !is_body && matches!(second, Shape::HalfSpace | Shape::Point) {
+    if matches!((&first, &second), (Shape::Capsule(_), Shape::Point)) {
         return None;
     }
     let setting = random.index(5);

@@ -7,8 +7,9 @@ use crate::reference::{self, capsule, half_space};
 use nalgebra::Vector3;
 use sublevel_core::body::Body;
 use sublevel_core::measure::{
-    Capsule, CapsuleDistance, Distance, Options, Pose, Status, Twist, WarmStart, distance, distance_of_capsules,
-    distance_to_capsule, distance_to_half_space, distance_to_point,
+    Capsule, CapsuleDistance, Distance, HalfSpace, HalfSpaceDistance, Options, Pose, Status, Twist, WarmStart,
+    distance, distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_half_space,
+    distance_to_point,
 };
 
 /// An answer, of whatever measure: metres, world frame.
@@ -49,12 +50,32 @@ impl Solved {
         Self { status, lower, upper, value, witness_a, witness_b, normal, tied, iterations, gradients }
     }
 
-    fn of_capsules(found: &CapsuleDistance, pose_a: &Pose, pose_b: &Pose) -> Self {
+    /// Of a body and a capsule, or two capsules, at these poses.
+    pub fn of_capsules(found: &CapsuleDistance, pose_a: &Pose, pose_b: &Pose) -> Self {
         let CapsuleDistance { status, lower, upper, normal, tied, iterations, .. } = *found;
         let (witness_a, witness_b) = (found.witness, found.witness_of_capsule);
         let gradients = found.gradients(pose_a, pose_b);
         let value = found.value();
         Self { status, lower, upper, value, witness_a, witness_b, normal, tied, iterations, gradients }
+    }
+
+    /// Of a body or a capsule and the half-space that [`Shape::HalfSpace`] is at its pose.
+    fn of_half_space(found: &HalfSpaceDistance, pose_a: &Pose, (half_space, pose_b): (&HalfSpace, &Pose)) -> Self {
+        let HalfSpaceDistance { status, lower, upper, witness, tied, iterations } = *found;
+        let (n, x) = (*half_space.normal(), witness);
+        let of_plane = Twist { linear: -n, angular: -(x - pose_b.translation()).cross(&n) };
+        Self {
+            status,
+            lower,
+            upper,
+            value: found.value(),
+            witness_a: x,
+            witness_b: x - n * (n.dot(&(x - pose_b.translation()))),
+            normal: Some(n),
+            tied,
+            iterations,
+            gradients: Some([found.pose_gradient(pose_a, half_space), of_plane]),
+        }
     }
 }
 
@@ -110,6 +131,20 @@ impl Reference {
         Self { lower, upper, normal, gradient }
     }
 
+    /// Of a body or a capsule and the half-space that [`Shape::HalfSpace`] is at its pose.
+    fn of_half_space(truth: half_space::Truth, pose_a: &Pose, (half_space, pose_b): (&HalfSpace, &Pose)) -> Self {
+        // The half-space turns about the translation of its own pose.
+        let n = half_space.normal();
+        let turning = Vector3::from_fn(|i, _| truth.gradient[3 + i]);
+        let about_b = turning + (pose_a.translation() - pose_b.translation()).cross(n);
+        let gradient = std::array::from_fn(|k| match k {
+            0..6 => truth.gradient[k],
+            6..9 => -n[k - 6],
+            _ => -about_b[k - 9],
+        });
+        Self { lower: Some(truth.lower), upper: truth.upper, normal: Some(*n), gradient }
+    }
+
     /// Distances that are 0 inside, whatever the depth.
     fn unsigned(self) -> Self {
         let positive = |value: Big| if value < Big::ZERO { big(0.0) } else { value };
@@ -121,7 +156,8 @@ impl Pair {
     /// Our answer to the pair.
     ///
     /// # Panics
-    /// On pairs that no measure is for: two points or half-spaces, and either beside a capsule.
+    /// On pairs that no measure is for: two points or half-spaces, and a point beside a capsule or
+    /// a half-space.
     pub fn solve(&self, options: &Options<'_>, warm: &mut WarmStart) -> Solved {
         let Self { a, pose_a, b, pose_b, .. } = self;
         match (a, b) {
@@ -156,22 +192,16 @@ impl Pair {
             (Shape::Body(body), Shape::HalfSpace) => {
                 let half_space = Shape::half_space(pose_b);
                 let found = distance_to_half_space(&**body, pose_a, &half_space, options, warm);
-                let (n, x) = (*half_space.normal(), found.witness);
-                let of_plane = Twist { linear: -n, angular: -(x - pose_b.translation()).cross(&n) };
-                Solved {
-                    status: found.status,
-                    lower: found.lower,
-                    upper: found.upper,
-                    value: found.value(),
-                    witness_a: x,
-                    witness_b: x - n * (n.dot(&(x - pose_b.translation()))),
-                    normal: Some(n),
-                    tied: found.tied,
-                    iterations: found.iterations,
-                    gradients: Some([found.pose_gradient(pose_a, &half_space), of_plane]),
-                }
+                Solved::of_half_space(&found, pose_a, (&half_space, pose_b))
             }
-            (_, Shape::Body(_)) => self.clone().swapped().solve(options, warm).swapped(),
+            (Shape::Capsule(capsule), Shape::HalfSpace) => {
+                let half_space = Shape::half_space(pose_b);
+                let found = distance_of_capsule_to_half_space(capsule, pose_a, &half_space, options);
+                Solved::of_half_space(&found, pose_a, (&half_space, pose_b))
+            }
+            (_, Shape::Body(_)) | (Shape::HalfSpace, Shape::Capsule(_)) => {
+                self.clone().swapped().solve(options, warm).swapped()
+            }
             _ => panic!("{} has no measure", self.what),
         }
     }
@@ -209,18 +239,14 @@ impl Pair {
             (Shape::Body(body), Shape::HalfSpace) => {
                 let half_space = Shape::half_space(pose_b);
                 let truth = half_space::signed_distance((body, pose_a), &half_space, &found.witness_a);
-                // The half-space turns about the translation of its own pose.
-                let n = half_space.normal();
-                let turning = Vector3::from_fn(|i, _| truth.gradient[3 + i]);
-                let about_b = turning + (pose_a.translation() - pose_b.translation()).cross(n);
-                let gradient = std::array::from_fn(|k| match k {
-                    0..6 => truth.gradient[k],
-                    6..9 => -n[k - 6],
-                    _ => -about_b[k - 9],
-                });
-                Reference { lower: Some(truth.lower), upper: truth.upper, normal: Some(*n), gradient }
+                Reference::of_half_space(truth, pose_a, (&half_space, pose_b))
             }
-            (_, Shape::Body(_)) => {
+            (Shape::Capsule(capsule), Shape::HalfSpace) => {
+                let half_space = Shape::half_space(pose_b);
+                let truth = half_space::signed_distance_of_capsule((capsule, pose_a), &half_space);
+                Reference::of_half_space(truth, pose_a, (&half_space, pose_b))
+            }
+            (_, Shape::Body(_)) | (Shape::HalfSpace, Shape::Capsule(_)) => {
                 let found = found.swapped();
                 self.clone().swapped().reference(&found).swapped()
             }
