@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::columns::{index_pairs, indices, name, number, of_rows, twist, vector};
+use super::columns::{index_pairs, indices, name, number, of_rows, text, twist, vector};
 use super::connection::Client;
 use super::error::ClientError;
 use super::states::PlacedStates;
@@ -131,6 +131,9 @@ pub struct StateClearance {
     pub near: Vec<NearPair>,
     /// Whether the poses or joint values are usable and all pairs were looked at.
     pub checked: bool,
+    /// Where the poses or joint values are not usable: the field that is wrong, why, and the remedy;
+    /// the server sends at most 1 MiB of them.
+    pub reason: Option<String>,
 }
 
 impl StateClearance {
@@ -191,9 +194,10 @@ fn read(response: &ClearanceResponse) -> Result<Vec<StateClearance>, ClientError
     let (mut near, mut states) = (near.into_iter(), Vec::with_capacity(response.checked.len()));
     let offsets: Vec<u32> = indices(&response.offsets).collect();
     of_rows("offsets", &response.offsets, response.checked.len() + 1, 4)?;
-    for (bounds, &checked) in offsets.windows(2).zip(&response.checked[..]) {
+    for (state, (bounds, &checked)) in offsets.windows(2).zip(&response.checked[..]).enumerate() {
         let count = bounds[1].checked_sub(bounds[0]).ok_or(ClientError::Unexpected("rows in no order"))?;
-        states.push(StateClearance { near: near.by_ref().take(count as usize).collect(), checked: checked == 1 });
+        let near = near.by_ref().take(count as usize).collect();
+        states.push(StateClearance { near, checked: checked == 1, reason: text(&response.reasons, state) });
     }
     let said = offsets.last().map(|&last| last as usize);
     if said != Some(rows) { Err(ClientError::Unexpected("rows of no state")) } else { Ok(states) }

@@ -37,6 +37,11 @@ pub(super) fn name(table: &[String], index: u32) -> Option<String> {
     table.get(usize::try_from(index).ok()?).cloned()
 }
 
+/// The text in a row; none where it is empty, and where there are no texts.
+pub(super) fn text(texts: &[String], row: usize) -> Option<String> {
+    texts.get(row).filter(|text| !text.is_empty()).cloned()
+}
+
 /// Refuses a column that has not `width` bytes for each of the rows.
 pub(super) fn of_rows(field: &str, column: &[u8], rows: usize, width: usize) -> Result<(), ClientError> {
     if column.len() == rows * width {

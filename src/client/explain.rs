@@ -108,6 +108,8 @@ pub struct ExplainedState {
     /// the robot is free: proven; radians, metres, unit quaternions. None of free states, of states
     /// that are poses, and where none were found.
     pub freed: Option<Vec<f64>>,
+    /// Of a state that is invalid: the field that is wrong, why, and the remedy.
+    pub reason: Option<String>,
 }
 
 impl Client {
@@ -128,6 +130,7 @@ fn read(response: &ExplainResponse) -> Result<ExplainedState, ClientError> {
         verdict: answer_wire::verdict(response.verdict, || "verdict".into())?,
         pairs: pairs.collect::<Result<_, _>>()?,
         freed: Some(freed).filter(|values| !values.is_empty()),
+        reason: Some(response.reason.clone()).filter(|reason| !reason.is_empty()),
     })
 }
 

@@ -46,7 +46,7 @@ pub enum RobotFilesError {
     Mesh {
         /// Name of the link.
         link: String,
-        /// Which and why.
+        /// Which and why; the remedy names methods of [`RobotFiles`].
         error: MeshPathError,
     },
     /// A file that no reader of meshes knows.
@@ -111,8 +111,10 @@ impl RobotFiles {
                 if found.iter().any(|(known, ..)| known == uri) {
                     continue;
                 }
-                let of_link = |error| RobotFilesError::Mesh { link: link.name.to_string(), error };
-                let file = self.meshes.resolve(uri).map_err(of_link)?;
+                let file = self.meshes.resolve(uri).map_err(|error| {
+                    let error = MeshPathError { remedy: by_methods(&error.remedy), ..error };
+                    RobotFilesError::Mesh { link: link.name.to_string(), error }
+                })?;
                 found.push((uri.clone(), link.name.to_string(), file));
             }
         }
@@ -155,6 +157,15 @@ impl Client {
 
 async fn text(file: &Path) -> Result<String, RobotFilesError> {
     tokio::fs::read_to_string(file).await.map_err(|source| RobotFilesError::Read { file: file.into(), source })
+}
+
+/// A remedy that names options of the command line, `--package NAME=DIR` and `--search DIR`, with
+/// the methods of [`RobotFiles`] that do the same.
+fn by_methods(remedy: &str) -> String {
+    let remedy = remedy.replace("--search DIR", "with_search(DIR)");
+    let Some((before, option)) = remedy.split_once("--package ") else { return remedy };
+    let Some((name, after)) = option.split_once("=DIR") else { return remedy };
+    format!("{before}with_package({name:?}, DIR){after}")
 }
 
 /// The format of a file, by its ending.

@@ -2,7 +2,7 @@
 
 use prost::Message;
 
-use super::columns::{index_pairs, name};
+use super::columns::{index_pairs, name, text};
 use super::connection::Client;
 use super::error::ClientError;
 use crate::measure::Pose;
@@ -118,6 +118,9 @@ pub struct CheckedStates {
     pub verdicts: Vec<StateVerdict>,
     /// The pair that decided, where one did.
     pub pairs: Vec<Option<[String; 2]>>,
+    /// One per state. Of a state that is invalid: the field that is wrong, why, and the remedy; the
+    /// server sends at most 1 MiB of them.
+    pub reasons: Vec<Option<String>>,
 }
 
 impl Client {
@@ -128,10 +131,12 @@ impl Client {
     pub async fn check_states(&self, scene: &str, question: StatesQuestion) -> Result<CheckedStates, ClientError> {
         let response = self.queries().check_states(question.asked(scene)).await.map_err(self.refused())?.into_inner();
         let pair = |[a, b]: [u32; 2]| Some([name(&response.objects, a)?, name(&response.objects, b)?]);
+        let verdicts = answer_wire::verdicts(&response.verdicts)?;
         Ok(CheckedStates {
             revision: response.scene_revision,
-            verdicts: answer_wire::verdicts(&response.verdicts)?,
             pairs: index_pairs(&response.pairs).map(pair).collect(),
+            reasons: (0..verdicts.len()).map(|state| text(&response.reasons, state)).collect(),
+            verdicts,
         })
     }
 

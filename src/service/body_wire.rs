@@ -1,13 +1,14 @@
 //! Bodies in messages.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use nalgebra::Vector3;
 use tonic::Status;
 
 use crate::body::{Body, BodyError, BodyId, Shape};
-use crate::measure::{Capsule, HalfSpace};
-use crate::scene::{Geometry, Ladder, NamedCapsule, NamedHalfSpace};
+use crate::measure::{Capsule, HalfSpace, HalfSpaceError};
+use crate::scene::{Geometry, Ladder, LadderError, NamedCapsule, NamedHalfSpace};
 use crate::store::CatalogueError;
 
 use super::blobs::Blobs;
@@ -27,22 +28,31 @@ pub(super) fn geometry(
     };
     let named = |kind: &str| if request.name.is_empty() { kind.to_owned() } else { request.name.clone() };
     let exact = |body: Result<Body, BodyError>, field: &str| -> Result<Geometry, Status> {
+        let field = if matches!(body, Err(BodyError::Name(_))) { "name" } else { field };
         let body = body.map_err(|error| Invalid::new(field, error))?;
         Ok(body.with_gap(0.0).into())
     };
     match source {
         Source::File(file) => read(file, "file"),
         Source::BlobId(id) => read(&blobs.get(id, "blob_id")?, "blob_id"),
-        Source::Ball(size) => exact(Body::ball(&named("ball"), Vector3::zeros(), size.radius_m), "ball"),
+        Source::Ball(size) => {
+            let field = "ball.radius_m";
+            check_size(size.radius_m, field)?;
+            exact(Body::ball(&named("ball"), Vector3::zeros(), size.radius_m), field)
+        }
         Source::Ellipsoid(size) => {
-            let half_axes = vector(size.half_axes_m.as_ref(), "ellipsoid.half_axes_m")?;
-            exact(Body::ellipsoid(&named("ellipsoid"), Vector3::zeros(), half_axes), "ellipsoid.half_axes_m")
+            let field = "ellipsoid.half_axes_m";
+            let half_axes = sizes(size.half_axes_m.as_ref(), field)?;
+            exact(Body::ellipsoid(&named("ellipsoid"), Vector3::zeros(), half_axes), field)
         }
         Source::Box(size) => {
-            let half_extents = vector(size.half_extents_m.as_ref(), "box.half_extents_m")?;
-            exact(Body::cuboid(&named("box"), half_extents), "box.half_extents_m")
+            let field = "box.half_extents_m";
+            let half_extents = sizes(size.half_extents_m.as_ref(), field)?;
+            exact(Body::cuboid(&named("box"), half_extents), field)
         }
         Source::Cylinder(size) => {
+            check_size(size.radius_m, "cylinder.radius_m")?;
+            check_size(size.half_height_m, "cylinder.half_height_m")?;
             exact(Body::cylinder(&named("cylinder"), size.radius_m, size.half_height_m), "cylinder")
         }
         Source::Capsule(size) => {
@@ -57,7 +67,10 @@ pub(super) fn geometry(
         Source::HalfSpace(size) => {
             let normal = vector(size.normal.as_ref(), "half_space.normal")?;
             let half_space = HalfSpace::new(normal, size.offset_m);
-            let half_space = half_space.map_err(|error| Invalid::new("half_space.normal", error))?;
+            let half_space = half_space.map_err(|error| {
+                let is_offset = error == HalfSpaceError::NotFinite("offset");
+                Invalid::new(if is_offset { "half_space.offset_m" } else { "half_space.normal" }, error)
+            })?;
             let named = NamedHalfSpace::new(&named("half-space"), half_space);
             let half_space = named.map_err(|error| Invalid::new("name", error))?;
             Ok(Geometry::HalfSpace(Arc::new(half_space)))
@@ -73,7 +86,7 @@ pub(super) fn geometry(
             };
             let rungs: Vec<Arc<Shape>> = rungs.body_ids.iter().enumerate().map(rung).collect::<Result<_, Status>>()?;
             let ladder = Ladder::new(&named("ladder"), rungs);
-            Ok(Geometry::Ladder(Arc::new(ladder.map_err(|error| Invalid::new("ladder.body_ids", error))?)))
+            Ok(Geometry::Ladder(Arc::new(ladder.map_err(|error| Invalid::new(ladder_field(&error), error))?)))
         }
     }
 }
@@ -83,9 +96,41 @@ fn read(file: &[u8], field: &str) -> Result<Geometry, Status> {
     Geometry::from_json(text).map_err(|error| Invalid::new(field, error).into())
 }
 
+/// Lengths between which sizes of bodies are, metres: what a normalization may have.
+const SIZES_M: RangeInclusive<f64> = 1e-30..=1e30;
+
+/// Refuses a size that no body has. Whether several make a body together shows when it is proven.
+fn check_size(size: f64, field: &str) -> Result<(), Invalid> {
+    // A NaN is in no range.
+    if SIZES_M.contains(&size) {
+        return Ok(());
+    }
+    Err(Invalid::new(field, format!("is {size:?} m; send a length between 1e-30 and 1e30 m")))
+}
+
+/// Three sizes.
+fn sizes(sizes: Option<&proto::Vector3>, field: &str) -> Result<Vector3<f64>, Invalid> {
+    let sizes = vector(sizes, field)?;
+    for (axis, size) in ["x", "y", "z"].into_iter().zip(sizes.iter()) {
+        check_size(*size, &format!("{field}.{axis}"))?;
+    }
+    Ok(sizes)
+}
+
 fn vector(vector: Option<&proto::Vector3>, field: &str) -> Result<Vector3<f64>, Invalid> {
     let vector = vector.ok_or_else(|| Invalid::new(field, "is missing; send x, y and z"))?;
     Ok(Vector3::new(vector.x, vector.y, vector.z))
+}
+
+/// Which field makes a ladder unusable.
+fn ladder_field(error: &LadderError) -> String {
+    match error {
+        LadderError::Name(_) => "name".to_owned(),
+        LadderError::Count(_) => "ladder.body_ids".to_owned(),
+        LadderError::Compound(index) | LadderError::Points(index) | LadderError::Order(index) => {
+            format!("ladder.body_ids[{index}]")
+        }
+    }
 }
 
 /// What a body is.

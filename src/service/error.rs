@@ -286,6 +286,7 @@ fn scene(error: &SceneError) -> Status {
         SceneError::Name { at, .. }
         | SceneError::Twice { at, .. }
         | SceneError::Itself { at, .. }
+        | SceneError::FrameLink { at, .. }
         | SceneError::RobotTwice { at, .. }
         | SceneError::OfRobot { at, .. }
         | SceneError::NameTaken { at, .. }

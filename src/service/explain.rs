@@ -12,6 +12,7 @@ use super::proto::{self, ExplainRequest, ExplainResponse};
 use super::query_wire;
 use super::robot_wire::numbers;
 use super::snapshot::snapshot;
+use super::state_reasons::reason_of_one;
 use super::wire::vector;
 use crate::scene::Scene;
 use crate::scene::query::{ExplainedPair, ExplainedState, Explanation, JointValues};
@@ -50,6 +51,7 @@ fn message(state: &ExplainedState, scene: &Scene) -> ExplainResponse {
         verdict: query_wire::verdict(state.verdict).into(),
         pairs: state.pairs.iter().map(|pair| pair_message(pair, scene)).collect(),
         freed_joint_values: numbers(state.freed.as_deref().unwrap_or_default()),
+        reason: state.invalid.as_deref().map(reason_of_one).unwrap_or_default(),
     }
 }
 

@@ -67,6 +67,7 @@ mod scenes;
 mod server;
 mod server_info;
 mod snapshot;
+mod state_reasons;
 mod tls;
 pub(crate) mod tokens;
 mod watched_files;

@@ -9,12 +9,14 @@ use super::call_time::CallTime;
 use super::error::{self, Invalid};
 use super::limits::{MAX_CERTIFICATES, MAX_MOTIONS, SMALL_SCENE};
 use super::packed::{self, Packed};
+use super::placed_states::joint_width;
 use super::proto::{
     self, CheckMotionsRequest, CheckMotionsResponse, MovingObjects, VerifyMotionRequest, VerifyMotionResponse,
 };
 use super::query_wire::{self, NOTHING, NameTable};
 use super::reason::Reason;
 use super::snapshot::snapshot;
+use crate::robot::Kinematics;
 use crate::robot::motion::{Certificate, MotionAnswer, MotionProblemError, MotionVerdict, PathError, VerifyOptions};
 use crate::scene::query::{MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError};
 use crate::scene::{Geometry, Scene, Stop};
@@ -41,7 +43,7 @@ const SMALL_PATHS_BYTES: usize = 1 << 16;
 fn asked(scene: &Scene, request: &CheckMotionsRequest) -> Result<RobotMotions, Status> {
     let motions = motions(scene, &request.robot, request.moving.as_ref(), request.margin_m, request.include_allowed)?;
     let values = packed::numbers(&request.joint_values, "joint_values")?;
-    let points = points(request, values.len(), motions.kinematics().width())?;
+    let points = points(request, values.len(), motions.kinematics())?;
     error::at_most("point_counts", points.len(), ("max_motions", MAX_MOTIONS))?;
     if request.certificates {
         error::at_most("point_counts", points.len(), ("max_certificates", MAX_CERTIFICATES))?;
@@ -52,7 +54,8 @@ fn asked(scene: &Scene, request: &CheckMotionsRequest) -> Result<RobotMotions, S
         Err(_) => return Err(Invalid::new("kind", "is no kind of path this server knows").into()),
     };
     let joints: Vec<Arc<str>> = request.joints.iter().map(|name| name.as_str().into()).collect();
-    let motions = motions.with_joint_paths(&joints, &values, &points, kind).map_err(|error| motions_error(&error))?;
+    let motions = motions.with_joint_paths(&joints, &values, &points, kind);
+    let motions = motions.map_err(|error| motions_error(&error, scene, request.moving.as_ref()))?;
     let motions = motions.with_settings(settings(request)?);
     Ok(if request.stop_at_first { motions.stopping_at_first() } else { motions })
 }
@@ -131,9 +134,9 @@ fn motions(
     if !margin_m.is_finite() {
         return Err(Invalid::new("margin_m", format!("is {margin_m} m; give a finite number")).into());
     }
-    let moving = moving.map(|moving| moving_objects(scene, moving)).transpose()?.unwrap_or_default();
-    let motions = RobotMotions::new(scene.clone(), robot, &moving, margin_m, include_allowed);
-    motions.map_err(|error| motions_error(&error).into())
+    let objects = moving.map(|moving| moving_objects(scene, moving)).transpose()?.unwrap_or_default();
+    let motions = RobotMotions::new(scene.clone(), robot, &objects, margin_m, include_allowed);
+    motions.map_err(|error| motions_error(&error, scene, moving).into())
 }
 
 fn moving_objects(scene: &Scene, moving: &MovingObjects) -> Result<Vec<MovingObject>, Status> {
@@ -151,20 +154,17 @@ fn moving_objects(scene: &Scene, moving: &MovingObjects) -> Result<Vec<MovingObj
 }
 
 /// Configurations of each path.
-fn points(request: &CheckMotionsRequest, values: usize, width: usize) -> Result<Vec<usize>, Invalid> {
+fn points(request: &CheckMotionsRequest, values: usize, kinematics: &Kinematics) -> Result<Vec<usize>, Invalid> {
     let counts = packed::indices::<1>(&request.point_counts, "point_counts")?;
     if !counts.is_empty() {
         return Ok(counts.into_iter().map(|[count]| count as usize).collect());
     }
-    // Joints that are named may have more than one value; a wrong number is refused with the
-    // values.
-    let width = if request.joints.is_empty() { width } else { request.joints.len() };
-    let edges = values / (2 * width).max(1);
-    if edges == 0 {
-        let why = format!("holds {values} numbers; an edge has 2 configurations of {width} values");
-        return Err(Invalid::new("joint_values", why));
+    if values == 0 {
+        return Err(Invalid::new("joint_values", "is empty; send 2 configurations for each edge"));
     }
-    Ok(vec![2; edges])
+    // At least one edge: names of joints and numbers of values that are wrong are refused with it.
+    let width = joint_width(kinematics, &request.joints);
+    Ok(vec![2; width.map_or(1, |width| values / (2 * width).max(1)).max(1)])
 }
 
 fn settings(request: &CheckMotionsRequest) -> Result<MotionSettings, Invalid> {
@@ -190,15 +190,23 @@ fn settings(request: &CheckMotionsRequest) -> Result<MotionSettings, Invalid> {
 }
 
 /// Which field makes motions unusable.
-fn motions_error(error: &RobotMotionsError) -> Invalid {
+fn motions_error(error: &RobotMotionsError, scene: &Scene, moving: Option<&MovingObjects>) -> Invalid {
+    let of_moving = |list: &str, object: &str| match carrier(scene, moving, object) {
+        Some(index) => format!("moving.{list}[{index}]"),
+        None => "robot".to_owned(),
+    };
     let field = match error {
-        RobotMotionsError::NoRobot(_) => "robot".to_owned(),
-        RobotMotionsError::Held(_) | RobotMotionsError::Twice(_) | RobotMotionsError::HalfSpace(_) => {
-            "moving.names".to_owned()
+        RobotMotionsError::NoRobot(_) | RobotMotionsError::Far(_) => "robot".to_owned(),
+        RobotMotionsError::Held(object) | RobotMotionsError::HalfSpace(object) | RobotMotionsError::TooFar(object) => {
+            of_moving("names", object)
         }
-        RobotMotionsError::TooFar(_) | RobotMotionsError::Far(_) => "robot".to_owned(),
+        RobotMotionsError::Twice(object) => {
+            let names = moving.into_iter().flat_map(|moving| &moving.names).enumerate();
+            let second = names.filter(|(_, name)| ***name == **object).nth(1);
+            second.map_or_else(|| "moving.names".to_owned(), |(index, _)| format!("moving.names[{index}]"))
+        }
         RobotMotionsError::NoShape(_) => "scene".to_owned(),
-        RobotMotionsError::Problem(MotionProblemError::Obstacle(_)) => "moving.end_poses".to_owned(),
+        RobotMotionsError::Problem(MotionProblemError::Obstacle(object)) => of_moving("end_poses", object),
         RobotMotionsError::Path { error: PathError::Floating, .. } => "kind".to_owned(),
         RobotMotionsError::Problem(_) => "margin_m".to_owned(),
         RobotMotionsError::Joints(error) => query_wire::joints_field(error),
@@ -206,6 +214,20 @@ fn motions_error(error: &RobotMotionsError) -> Invalid {
         RobotMotionsError::Path { index, .. } => format!("point_counts[{index}]"),
     };
     Invalid::new(field, error)
+}
+
+/// Position, among the names of objects that move by themselves, of an object or else of what holds
+/// it; none of what the robot holds.
+fn carrier(scene: &Scene, moving: Option<&MovingObjects>, object: &str) -> Option<usize> {
+    let names = &moving?.names;
+    let mut slot = scene.slot(object)?;
+    loop {
+        let object = scene.object(slot)?;
+        if let Some(index) = names.iter().position(|name| **name == *object.name) {
+            return Some(index);
+        }
+        slot = scene.slot(&object.attachment.as_ref()?.to)?;
+    }
 }
 
 /// Columns of an answer, a row a path.

@@ -8,6 +8,7 @@ use super::error::{self, Invalid};
 use super::limits::{MAX_STATE_POSES, MAX_STATES};
 use super::reason::Reason;
 use super::{packed, query_wire};
+use crate::robot::Kinematics;
 use crate::scene::{Scene, Slot};
 
 /// What places the objects of every state.
@@ -48,8 +49,20 @@ impl PlacedStates {
             return Err(error::not_found(Reason::RobotNotFound, robot, "robot", why));
         };
         let numbers = packed::numbers(values, "joint_values")?;
-        let per_state = if joints.is_empty() { instance.configuration().len() } else { joints.len() };
-        error::at_most("joint_values", numbers.len() / per_state.max(1), ("max_states", MAX_STATES))?;
+        if let Some(width) = joint_width(instance.robot().kinematics(), joints) {
+            error::at_most("joint_values", numbers.len() / width.max(1), ("max_states", MAX_STATES))?;
+        }
         Ok(Self::Joints(joints.iter().map(|name| name.as_str().into()).collect(), numbers))
     }
+}
+
+/// Values of one configuration: of the joints that are named, a planar one of which has 3 and a
+/// floating one 7, or of all without names. None where the robot does not have one of the joints,
+/// which is refused with the names.
+pub(super) fn joint_width(kinematics: &Kinematics, joints: &[String]) -> Option<usize> {
+    if joints.is_empty() {
+        return Some(kinematics.width());
+    }
+    let width = |name: &String| Some(kinematics.variables()[kinematics.variable(name)?].kind.width());
+    joints.iter().map(width).sum()
 }

@@ -24,6 +24,7 @@ use super::proto::{
 use super::query_wire::{NOTHING, NameTable, Outputs};
 use super::reason::Reason;
 use super::snapshot::snapshot;
+use super::state_reasons::StateReasons;
 use super::{contact_watch, explain, motions, query_wire, wire};
 use crate::scene::query::{
     Answer, AnswerStatus, Ask, Clearance, Found, JointValues, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict,
@@ -378,7 +379,9 @@ fn states_response(answers: &[StateAnswer], scene: &Scene, scene_revision: u64) 
     let mut names = NameTable::default();
     let (mut verdicts, mut certainties, mut pairs) = (Packed::default(), Packed::default(), Packed::default());
     let (mut lower, mut upper) = (Packed::default(), Packed::default());
+    let mut reasons = StateReasons::default();
     for answer in answers {
+        reasons.push(answer.invalid.as_deref());
         let verdict = query_wire::verdict(answer.verdict);
         let certainty = query_wire::certainty(answer.certainty);
         verdicts.byte(u8::try_from(i32::from(verdict)).unwrap_or(0));
@@ -400,6 +403,7 @@ fn states_response(answers: &[StateAnswer], scene: &Scene, scene_revision: u64) 
         upper_m: upper.into_bytes(),
         complete: answers.iter().all(|answer| answer.verdict != StateVerdict::NotChecked),
         solved_pairs: answers.iter().map(|answer| u64::from(answer.solved)).sum(),
+        reasons: reasons.into_texts(),
     }
 }
 

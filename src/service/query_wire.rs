@@ -17,6 +17,7 @@ use super::error::{self, Invalid};
 use super::packed::{self, Packed};
 use super::proto::{self, Layout, Output};
 use super::reason::Reason;
+use super::state_reasons::StateReasons;
 use super::wire;
 
 /// What of an answer is sent, and how.
@@ -358,9 +359,10 @@ pub(super) fn clearance(
     let [mut padding, mut gradient_a, mut gradient_b, mut normal] = [(); 4].map(|()| Packed::default());
     let [mut flag_bytes, mut checked, mut joint_gradients] = [(); 3].map(|()| Packed::default());
     let [mut witness_a, mut witness_b] = [(); 2].map(|()| Packed::default());
-    let mut rows = 0;
+    let (mut rows, mut reasons) = (0, StateReasons::default());
     offsets.index(0);
     for state in states {
+        reasons.push(state.invalid.as_deref());
         checked.byte(state.checked.into());
         for ClearanceRow { pair, answer, padding_m } in &state.rows {
             pair.iter().for_each(|&slot| pairs.index(names.place(slot, scene)));
@@ -400,6 +402,7 @@ pub(super) fn clearance(
         joint_gradients: joint_gradients.into_bytes(),
         witness_a_m: witness_a.into_bytes(),
         witness_b_m: witness_b.into_bytes(),
+        reasons: reasons.into_texts(),
     }
 }
 

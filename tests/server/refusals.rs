@@ -6,11 +6,14 @@ use crate::harness::{
 };
 use nalgebra::Vector3;
 use sublevel::body::Body;
+use sublevel::service::proto::create_body_request::Source;
 use sublevel::service::proto::evaluate_request::Question;
 use sublevel::service::proto::{
-    Attach, Attachment, CastRaysRequest, CheckStatesRequest, CreateSceneRequest, DeleteBodyRequest, DeleteSceneRequest,
-    EvaluateRequest, GetBodyRequest, GetSceneRequest, Layout, ListBodiesRequest, Measure, MeasureAccuracy, Object,
-    ObjectPair, ObjectPose, PairList, Pose, Selection, UpdateSceneRequest, WithinMargin,
+    self, Attach, Attachment, BallSize, BoxSize, CapsuleSize, CastRaysRequest, CheckStatesRequest, ClearanceRequest,
+    CreateBodyRequest, CreateSceneRequest, CylinderSize, DeleteBodyRequest, DeleteSceneRequest, EllipsoidSize,
+    EvaluateRequest, EvaluateStreamRequest, ExplainRequest, GetBodyRequest, GetSceneRequest, HalfSpaceSize,
+    LadderRungs, Layout, ListBodiesRequest, Measure, MeasureAccuracy, Object, ObjectPair, ObjectPose, PairList, Pose,
+    Selection, UpdateSceneRequest, WithinMargin, evaluate_stream_response,
 };
 use tonic::{Code, Status};
 
@@ -175,6 +178,94 @@ async fn scenes_and_bodies() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn primitives_are_refused_by_field() {
+    let (_dir, _server, mut clients, ball_id) = room().await;
+    let named = |name: &str, source: Source| CreateBodyRequest { name: name.into(), source: Some(source) };
+    let vector = |[x, y, z]: [f64; 3]| Some(proto::Vector3 { x, y, z });
+    let ball = |radius_m: f64| Source::Ball(BallSize { radius_m });
+    let ellipsoid = |axes: [f64; 3]| Source::Ellipsoid(EllipsoidSize { half_axes_m: vector(axes) });
+    let cuboid = |extents: [f64; 3]| Source::Box(BoxSize { half_extents_m: vector(extents) });
+    let cylinder = |radius_m: f64, half_height_m: f64| Source::Cylinder(CylinderSize { radius_m, half_height_m });
+    let capsule = |radius_m: f64, half_height_m: f64| Source::Capsule(CapsuleSize { radius_m, half_height_m });
+    let plane = |normal: [f64; 3], offset_m: f64| Source::HalfSpace(HalfSpaceSize { normal: vector(normal), offset_m });
+    let ladder = |ids: &[&str]| Source::Ladder(LadderRungs { body_ids: ids.iter().map(|&id| id.to_owned()).collect() });
+    let rod = clients.bodies.create_body(named("", capsule(0.1, 0.5))).await.expect("stored").into_inner();
+    let rod = rod.body.expect("a body").id;
+    let (nan, inf) = (f64::NAN, f64::INFINITY);
+
+    let mut cases: Vec<(Source, String)> = Vec::new();
+    // Bodies have sizes from 1e-30 to 1e30 m.
+    for bad in [0.0, -1.0, nan, inf, -inf, 9e-31, 1.1e30] {
+        cases.push((ball(bad), "ball.radius_m".into()));
+        cases.push((cylinder(bad, 1.0), "cylinder.radius_m".into()));
+        cases.push((cylinder(1.0, bad), "cylinder.half_height_m".into()));
+        for (place, axis) in ["x", "y", "z"].into_iter().enumerate() {
+            let mut sizes = [1.0, 2.0, 3.0];
+            sizes[place] = bad;
+            cases.push((ellipsoid(sizes), format!("ellipsoid.half_axes_m.{axis}")));
+            cases.push((cuboid(sizes), format!("box.half_extents_m.{axis}")));
+        }
+    }
+    // A capsule may be a segment or a ball.
+    for bad in [-1.0, nan, inf, 1.1e15] {
+        cases.push((capsule(bad, 1.0), "capsule.radius_m".into()));
+        cases.push((capsule(1.0, bad), "capsule.half_height_m".into()));
+    }
+    for normal in [[0.0; 3], [0.0, 0.0, 2.0], [0.0, nan, 1.0], [inf, 0.0, 0.0]] {
+        cases.push((plane(normal, 0.0), "half_space.normal".into()));
+    }
+    for offset in [nan, inf, 1e16, -1e16] {
+        cases.push((plane([0.0, 0.0, 1.0], offset), "half_space.offset_m".into()));
+    }
+    let others = [
+        // So thin that rounding leaves no ball that is proven to lie inside: the sizes are wrong
+        // together.
+        (ellipsoid([1e9, 1.0, 1.0]), "ellipsoid.half_axes_m"),
+        (cuboid([1e9, 1.0, 1.0]), "box.half_extents_m"),
+        (cylinder(1.0, 1e9), "cylinder"),
+        (Source::Ellipsoid(EllipsoidSize { half_axes_m: None }), "ellipsoid.half_axes_m"),
+        (Source::Box(BoxSize { half_extents_m: None }), "box.half_extents_m"),
+        (Source::HalfSpace(HalfSpaceSize { normal: None, offset_m: 0.0 }), "half_space.normal"),
+        (ladder(&[]), "ladder.body_ids"),
+        (ladder(&[&ball_id]), "ladder.body_ids"),
+        (ladder(&[&rod]), "ladder.body_ids[0]"),
+        (ladder(&[&ball_id, &rod]), "ladder.body_ids[1]"),
+        (ladder(&[&ball_id, "chair"]), "ladder.body_ids[1]"),
+        // It was not fitted, so that it is not proven to contain any points.
+        (ladder(&[&ball_id, &ball_id]), "ladder.body_ids[0]"),
+    ];
+    cases.extend(others.map(|(source, at)| (source, at.to_owned())));
+    for (source, at) in cases {
+        let what = format!("{source:?}");
+        let status = clients.bodies.create_body(named("", source)).await.expect_err(&what);
+        assert_eq!(field(&status), at, "{what}: {}", status.message());
+        check(&status, Code::InvalidArgument, &at);
+    }
+    let missing = named("", ladder(&[&ball_id, &"0".repeat(64)]));
+    let status = clients.bodies.create_body(missing).await.expect_err("unknown");
+    check(&status, Code::NotFound, "ladder.body_ids[1]");
+    let sources = [
+        ball(1.0),
+        ellipsoid([1.0, 2.0, 3.0]),
+        cuboid([1.0, 2.0, 3.0]),
+        cylinder(1.0, 2.0),
+        capsule(1.0, 2.0),
+        plane([0.0, 0.0, 1.0], 0.0),
+        ladder(&[&ball_id, &ball_id]),
+    ];
+    for source in sources {
+        for name in ["two\nlines", &"x".repeat(201)] {
+            let status = clients.bodies.create_body(named(name, source.clone())).await.expect_err("a bad name");
+            check(&status, Code::InvalidArgument, "name");
+        }
+    }
+    let listed = clients.bodies.list_bodies(ListBodiesRequest::default()).await.expect("a list").into_inner();
+    assert_eq!(listed.bodies.len(), 2, "nothing was stored");
+    // A segment and its radius are kept as they are, whatever their ratio.
+    clients.bodies.create_body(named("", capsule(1.0, 1e9))).await.expect("a thin capsule");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn queries() {
     let (_dir, _server, mut clients, _) = room().await;
     let distance = || question(vec![pair("a", "b")], &[Measure::Distance]);
@@ -333,6 +424,73 @@ async fn states_and_rays() {
     let lower = f64::from_le_bytes(hit.lower_m[..8].try_into().expect("a number"));
     assert_eq!((hit.objects, &hit.hits[..]), (vec!["a".to_owned()], &[0, 0, 0, 0][..]));
     assert!((lower - 4.0).abs() < 1e-8, "{lower}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn budgets_of_no_time() {
+    let (_dir, _server, mut clients, _) = room().await;
+    let numbers = |numbers: &[f64]| numbers.iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>();
+    let (scene, objects) = ("room".to_owned(), vec!["a".to_owned()]);
+    let poses = bytes::Bytes::from(numbers(&[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]));
+    let evaluate = |budget_ms| EvaluateRequest { budget_ms, ..question(vec![pair("a", "b")], &[Measure::Distance]) };
+    for budget_ms in [Some(0), Some(60_000), None] {
+        let (scene, objects, poses) = (|| scene.clone(), || objects.clone(), || poses.clone());
+        let states = CheckStatesRequest {
+            scene: scene(),
+            objects: objects(),
+            poses: poses(),
+            budget_ms,
+            ..CheckStatesRequest::default()
+        };
+        let clearance = ClearanceRequest {
+            scene: scene(),
+            objects: objects(),
+            poses: poses(),
+            budget_ms,
+            ..ClearanceRequest::default()
+        };
+        let explain = ExplainRequest {
+            scene: scene(),
+            objects: objects(),
+            poses: poses(),
+            budget_ms,
+            ..ExplainRequest::default()
+        };
+        let rays = CastRaysRequest {
+            scene: scene(),
+            origins_m: numbers(&[-5.0, 0.0, 0.0]).into(),
+            directions: numbers(&[1.0, 0.0, 0.0]).into(),
+            max_length_m: 10.0,
+            budget_ms,
+            ..CastRaysRequest::default()
+        };
+        let answers = [
+            ("Evaluate", clients.queries.evaluate(evaluate(budget_ms)).await.map(|_| ())),
+            ("CheckStates", clients.queries.check_states(states).await.map(|_| ())),
+            ("Clearance", clients.queries.clearance(clearance).await.map(|_| ())),
+            ("Explain", clients.queries.explain(explain).await.map(|_| ())),
+            ("CastRays", clients.queries.cast_rays(rays).await.map(|_| ())),
+        ];
+        for (call, answer) in answers {
+            match (budget_ms, answer) {
+                (Some(0), Err(status)) => check(&status, Code::InvalidArgument, "budget_ms"),
+                (Some(1..) | None, Ok(())) => {}
+                (budget_ms, answer) => panic!("{call} with {budget_ms:?}: {answer:?}"),
+            }
+        }
+    }
+    // In a stream the message is refused, and the next one is answered.
+    let messages = [(1, Some(0)), (2, Some(60_000))];
+    let messages =
+        messages.map(|(sequence, budget_ms)| EvaluateStreamRequest { sequence, evaluate: Some(evaluate(budget_ms)) });
+    let stream = clients.queries.evaluate_stream(tokio_stream::iter(messages)).await;
+    let mut answers = stream.expect("a stream").into_inner();
+    let first = answers.message().await.expect("no error").expect("an answer");
+    let Some(evaluate_stream_response::Result::Error(error)) = first.result else { panic!("{first:?}") };
+    assert_eq!((first.sequence, error.field.as_str()), (1, "budget_ms"));
+    let second = answers.message().await.expect("no error").expect("an answer");
+    let is_answer = matches!(second.result, Some(evaluate_stream_response::Result::Answer(_)));
+    assert!(second.sequence == 2 && is_answer, "{second:?}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

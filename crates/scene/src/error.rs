@@ -8,7 +8,7 @@ use sublevel_core::measure::PoseError;
 
 use super::structure::MAX_HOLDERS;
 use super::{MAX_NAME_BYTES, MAX_PADDING_M, NameError};
-use crate::robot::JointsError;
+use crate::robot::{FrameHolder, JointsError};
 
 /// The lists of an [`Update`](super::Update).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,6 +117,18 @@ pub enum SceneError {
         at: Entry,
         /// The object.
         name: Arc<str>,
+    },
+    /// A link without geometry, which is no object, is to hold something.
+    #[error("link \"{link}\" of robot \"{robot}\" has no geometry; {instead}")]
+    FrameLink {
+        /// Where.
+        at: Entry,
+        /// The link.
+        link: Arc<str>,
+        /// The robot.
+        robot: Arc<str>,
+        /// What can hold it.
+        instead: FrameHolder,
     },
     /// The update places a body that is not stored.
     #[error("no body {id}; create it first")]

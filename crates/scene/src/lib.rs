@@ -32,8 +32,8 @@ pub use object::{Attachment, LinkOf, Object, Slot, Subject};
 pub use own_starts::OwnStarts;
 pub use pair_cache::WarmStartUse;
 pub use robot::{
-    DeriveProgress, DerivedLinks, JointsError, NamedJointValues, ParseRobotIdError, PlaceRobot, PrimitiveError, Robot,
-    RobotError, RobotId, RobotInstance, RobotLink, primitive_bodies,
+    DeriveProgress, DerivedLinks, FrameHolder, JointsError, NamedJointValues, ParseRobotIdError, PlaceRobot,
+    PrimitiveError, Robot, RobotError, RobotId, RobotInstance, RobotLink, primitive_bodies,
 };
 pub use rules::{Rules, SubjectPair};
 pub use scene::Scene;

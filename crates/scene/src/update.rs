@@ -13,7 +13,7 @@ use super::rules::{SubjectPair, ordered};
 use super::scene::Scene;
 use super::structure::Structure;
 use super::{Geometry, MAX_OBJECTS, MAX_PADDING_M, MAX_PAIR_RULES, MAX_ROBOTS, check_name};
-use crate::robot::{NamedJointValues, PlaceRobot, check_names, move_robots, place_robots, remove_robots};
+use crate::robot::{FrameLink, NamedJointValues, PlaceRobot, check_names, move_robots, place_robots, remove_robots};
 
 /// An object to add or to replace.
 #[derive(Debug, Clone, PartialEq)]
@@ -410,6 +410,11 @@ fn check_subject(structure: &Structure, at: Entry, subject: &Subject) -> Result<
 /// The object that is to hold another one.
 fn find_holder(structure: &Structure, at: Entry, (held, to): (&Arc<str>, &Arc<str>)) -> Result<Slot, SceneError> {
     let at = at.part(Part::Holder);
+    if structure.slot(to).is_none()
+        && let Some(FrameLink { link, robot, holder }) = FrameLink::named(&structure.robots, to)
+    {
+        return Err(SceneError::FrameLink { at, link, robot, instead: holder });
+    }
     let holder = find(structure, at, to)?;
     if held == to { Err(SceneError::Itself { at, name: held.clone() }) } else { Ok(holder) }
 }

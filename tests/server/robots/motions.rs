@@ -1,19 +1,27 @@
 //! Motions and their certificates, over the wire.
 
-use sublevel::client::{CertificateQuestion, CheckedMotion, MotionsQuestion};
+use sublevel::client::{BodySource, CertificateQuestion, CheckedMotion, Client, MotionsQuestion};
 use sublevel::scene::query::StateVerdict;
 use sublevel::scene::{Attach, Subject, Update};
-use sublevel::service::proto::{CheckMotionsRequest, MovingObjects, PathKind, Verdict, VerifyMotionRequest};
+use sublevel::service::proto::{
+    CheckMotionsRequest, CheckStatesRequest, MovingObjects, PathKind, Verdict, VerifyMotionRequest,
+};
 use sublevel::store::RobotSource;
+use tonic::Code;
 
 use super::questions::packed;
-use super::{SRDF, URDF, at, cell, served};
-use crate::harness::field;
+use super::{SRDF, URDF, at, cell, placement, served};
+use crate::harness::{Running, field};
 
 fn refused<T: std::fmt::Debug>(answer: Result<T, tonic::Status>, at: &str) {
-    let status = answer.expect_err("refused");
-    assert_eq!((status.code(), field(&status).as_str()), (tonic::Code::InvalidArgument, at), "{}", status.message());
+    refused_with(answer, Code::InvalidArgument, at);
+}
+
+fn refused_with<T: std::fmt::Debug>(answer: Result<T, tonic::Status>, code: Code, at: &str) -> tonic::Status {
+    let status = answer.expect_err(at);
+    assert_eq!((status.code(), field(&status).as_str()), (code, at), "{}", status.message());
     assert!(status.message().len() > 20, "{}", status.message());
+    status
 }
 
 /// A change that makes a request unusable.
@@ -236,6 +244,105 @@ async fn searches_that_may_not_look_closer_leave_paths_undecided() {
     assert!(motion.certificate.is_none());
 }
 
+/// A base that drives about, of a kind of joint with several values, and an arm on it that turns.
+const CART: &str = r#"<robot name="cart">
+  <link name="floor"/>
+  <link name="base"><collision><geometry><sphere radius="0.2"/></geometry></collision></link>
+  <link name="arm"><collision><origin xyz="0 0 0.5"/><geometry><sphere radius="0.05"/></geometry></collision></link>
+  <joint name="drive" type="KIND"><parent link="floor"/><child link="base"/><axis xyz="0 0 1"/></joint>
+  <joint name="lift" type="revolute"><parent link="base"/><child link="arm"/>
+    <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+</robot>"#;
+
+/// A scene with the name of a kind of joint: the cart at the origin, and a ball at x = 1 m.
+async fn yard(client: &Client, kind: &str) {
+    let source = RobotSource { urdf: CART.replace("KIND", kind), ..RobotSource::default() };
+    let robot = client.load_robot(&source).await.expect("loaded");
+    client.create_scene(kind).await.expect("made");
+    client.place_robot(kind, &placement(&robot, "cart", 0.0)).await.expect("placed");
+    let thing = client.create_ball("thing", 0.05).await.expect("a ball");
+    client.put_objects(kind, [("post", &thing, at(1.0, 0.0, 0.0))]).await.expect("placed");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn edges_of_planar_and_floating_joints_need_no_counts() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let (client, mut clients) = (server.client().await, server.connect().await);
+    let named = |names: &[&str]| names.iter().map(|&name| name.to_owned()).collect::<Vec<_>>();
+    // The ends of an edge through the ball, and those of one beside it.
+    type Ends<'a> = [&'a [f64]; 4];
+    let planar: Ends<'_> = [&[0.0; 3], &[2.0, 0.0, 0.0], &[0.0; 3], &[0.0, 1.0, 0.5]];
+    let rest = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let floating: Ends<'_> = [&rest, &[2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], &rest, &[0.0, 0.0, 2.0, 0.0, 0.0, 0.6, 0.8]];
+    for (kind, ends) in [("planar", planar), ("floating", floating)] {
+        yard(&client, kind).await;
+        let ask = |names: &[&str], values: &[f64]| CheckMotionsRequest {
+            scene: kind.into(),
+            robot: "cart".into(),
+            joints: named(names),
+            joint_values: packed(values),
+            cold: true,
+            ..Default::default()
+        };
+        let lift = &[0.3][..];
+        let cases: [(&[&str], Vec<f64>); 3] = [
+            (&["drive"], ends.concat()),
+            (&["lift", "drive"], ends.map(|drive| [lift, drive].concat()).concat()),
+            (&[], ends.map(|drive| [drive, lift].concat()).concat()),
+        ];
+        for (names, values) in cases {
+            let request = ask(names, &values);
+            let counts: Vec<u8> = [2_u32; 2].into_iter().flat_map(u32::to_le_bytes).collect();
+            let counted = CheckMotionsRequest { point_counts: counts.into(), ..request.clone() };
+            let found = clients.queries.check_motions(request).await.expect("answered").into_inner();
+            let counted = clients.queries.check_motions(counted).await.expect("answered").into_inner();
+            assert_eq!(&found.verdicts[..], [Verdict::Contact as u8, Verdict::Free as u8], "{kind} {names:?}");
+            assert_eq!(found, counted, "{kind} {names:?}");
+        }
+        let width = ends[0].len();
+        for (names, count, field) in [
+            (&["drive"][..], 0, "joint_values"),
+            (&["drive"], width, "joint_values"),
+            (&["drive"], 2 * width + 1, "joint_values"),
+            (&["drive"], 3 * width, "joint_values"),
+            (&["lift", "drive"], 2 * width, "joint_values"),
+            (&[], 2 * width, "joint_values"),
+            (&["drive", "drive"], 2 * width, "joints[1]"),
+            (&["lift", "steer"], 2 * width, "joints[1]"),
+        ] {
+            refused(clients.queries.check_motions(ask(names, &vec![0.0; count])).await, field);
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn states_of_planar_and_floating_joints_are_counted_by_their_values() {
+    const MOST: usize = 1 << 16;
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let (client, mut clients) = (server.client().await, server.connect().await);
+    for (kind, state) in [("planar", &[0.0, 1.0, 0.5][..]), ("floating", &[0.0, 0.0, 2.0, 0.0, 0.0, 0.6, 0.8])] {
+        yard(&client, kind).await;
+        let ask = |joint: &str, count: usize| CheckStatesRequest {
+            scene: kind.into(),
+            robot: "cart".into(),
+            joints: vec![joint.into()],
+            joint_values: packed(&state.repeat(count)),
+            ..Default::default()
+        };
+        let found = clients.queries.check_states(ask("drive", MOST)).await.expect("the limit itself is fine");
+        let verdicts = found.into_inner().verdicts;
+        assert_eq!(verdicts.len(), MOST, "{kind}");
+        assert!(verdicts.iter().all(|&verdict| verdict == Verdict::Free as u8), "{kind}");
+        let many = clients.queries.check_states(ask("drive", MOST + 1)).await;
+        let status = refused_with(many, Code::ResourceExhausted, "joint_values");
+        assert!(status.message().contains("max_states"), "{kind}: {}", status.message());
+        // How many states there are is not known without the joint.
+        refused(clients.queries.check_states(ask("steer", MOST)).await, "joints[0]");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn control_points_are_those_of_a_bezier_segment() {
     let dir = tempfile::tempdir().expect("a directory");
@@ -317,15 +424,22 @@ async fn a_certificate_of_something_else_is_refused_with_what_differs() {
         client.update_scene("cell", &back).await.expect("changed back");
         assert_eq!(holds().await, Ok(()), "{word}");
     }
-    // Where one of the limits is another, though the motion keeps within both.
+    // Where one of the limits is another, though the motion keeps within both; and where the hand
+    // is of another body, which is smaller.
     let hand = robot.links.iter().find(|link| &*link.name == "hand").and_then(|link| link.body).expect("a body");
-    let source = |urdf: String| RobotSource { urdf, srdf: SRDF.into(), bodies: [("hand".into(), hand)].into() };
-    let other = source(URDF.replace("upper=\"2\"", "upper=\"2.1\""));
-    let other = client.load_robot(&other).await.expect("loaded");
-    client.delete_scene("cell").await.expect("deleted");
-    cell(&client, &other).await;
-    let reason = reason().await;
-    assert!(reason.contains("another robot"), "{reason}");
+    let smaller = client.create_ball("hand", 0.09).await.expect("a ball");
+    let source = |urdf: String, hand| RobotSource { urdf, srdf: SRDF.into(), bodies: [("hand".into(), hand)].into() };
+    for (other, word) in [
+        (source(URDF.replace("upper=\"2\"", "upper=\"2.1\""), hand), "another robot"),
+        (source(URDF.into(), smaller), "another set of bodies"),
+    ] {
+        let other = client.load_robot(&other).await.expect("loaded");
+        assert_ne!(other.id, robot.id, "{word}");
+        client.delete_scene("cell").await.expect("deleted");
+        cell(&client, &other).await;
+        let reason = reason().await;
+        assert!(reason.contains(word), "{word}: {reason}");
+    }
     client.delete_scene("cell").await.expect("deleted");
     cell(&client, &robot).await;
     assert_eq!(holds().await, Ok(()), "the same scene made again");
@@ -380,7 +494,87 @@ async fn obstacles_may_move_meanwhile() {
     assert!(found.objects.contains(&"load".to_owned()), "{:?}", found.objects);
     let held = MovingObjects { names: vec!["held".into()], ..moving };
     let status = clients.queries.check_motions(CheckMotionsRequest { moving: Some(held), ..request }).await;
-    refused(status, "moving.names");
+    refused(status, "moving.names[0]");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_that_cannot_move_are_refused_by_their_position() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, mut clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    let thing = client.create_ball("thing", 0.05).await.expect("a ball");
+    let below = BodySource::HalfSpace { normal: nalgebra::Vector3::z(), offset: -20.0 };
+    let floor = client.create_body("floor", below).await.expect("a half-space").id;
+    let objects = [("other", &thing, at(6.0, 0.0, 0.0)), ("floor", &floor, at(0.0, 0.0, 0.0))];
+    client.put_objects("cell", objects).await.expect("placed");
+    let free = CheckMotionsRequest {
+        scene: "cell".into(),
+        robot: "one".into(),
+        joints: vec!["lift".into()],
+        joint_values: packed(&[0.0, -0.5]),
+        certificates: true,
+        ..Default::default()
+    };
+    let found = clients.queries.check_motions(free.clone()).await.expect("answered").into_inner();
+    assert_eq!(&found.verdicts[..], [Verdict::Free as u8]);
+    let proof = VerifyMotionRequest {
+        certificate: found.certificates[0].clone(),
+        scene: "cell".into(),
+        robot: "one".into(),
+        ..Default::default()
+    };
+
+    let pose = |x: f64, w: f64| [x, 0.0, 5.0, 0.0, 0.0, 0.0, w];
+    let (there, beyond) = (pose(6.0, 1.0), pose(1.1e15, 1.0));
+    let (nan, infinite) = (pose(f64::NAN, 1.0), pose(f64::INFINITY, 1.0));
+    let (no_turn, long) = (pose(6.0, f64::NAN), pose(6.0, 2.0));
+    let moving = |names: &[&str], start: &[[f64; 7]], end: &[[f64; 7]]| MovingObjects {
+        names: names.iter().map(|&name| name.into()).collect(),
+        start_poses: packed(start.as_flattened()),
+        end_poses: packed(end.as_flattened()),
+    };
+    let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
+    let two = ["post", "other"];
+    let cases = [
+        (moving(&["post"], &[nan], &[there]), invalid, "moving.start_poses[0]"),
+        (moving(&two, &[there, infinite], &[there; 2]), invalid, "moving.start_poses[1]"),
+        (moving(&two, &[there, no_turn], &[there; 2]), invalid, "moving.start_poses[1]"),
+        (moving(&two, &[there, long], &[there; 2]), invalid, "moving.start_poses[1]"),
+        (moving(&two, &[beyond, there], &[there; 2]), invalid, "moving.start_poses[0]"),
+        (moving(&two, &[there, pose(6.0, 0.0)], &[there; 2]), invalid, "moving.start_poses[1]"),
+        (moving(&two, &[there; 2], &[there, nan]), invalid, "moving.end_poses[1]"),
+        (moving(&two, &[there; 2], &[long, there]), invalid, "moving.end_poses[0]"),
+        (moving(&two, &[there], &[there; 2]), invalid, "moving.start_poses"),
+        (moving(&two, &[there; 2], &[there; 3]), invalid, "moving.end_poses"),
+        // Each may stand there, but no velocity of at most 1e15 leads from one to the other.
+        (moving(&two, &[there, pose(-9e14, 1.0)], &[there, pose(9e14, 1.0)]), invalid, "moving.end_poses[1]"),
+        (moving(&["post", "gone"], &[there; 2], &[there; 2]), missing, "moving.names[1]"),
+        (moving(&["", "post"], &[there; 2], &[there; 2]), invalid, "moving.names[0]"),
+        (moving(&["post", "other", "post"], &[there; 3], &[there; 3]), invalid, "moving.names[2]"),
+        (moving(&["post", "post", "post"], &[there; 3], &[there; 3]), invalid, "moving.names[1]"),
+        (moving(&["post", "held"], &[there; 2], &[there; 2]), invalid, "moving.names[1]"),
+        (moving(&["one/hand"], &[there], &[there]), invalid, "moving.names[0]"),
+        (moving(&["post", "two/arm"], &[there; 2], &[there; 2]), invalid, "moving.names[1]"),
+        (moving(&["post", "floor"], &[there; 2], &[there; 2]), invalid, "moving.names[1]"),
+    ];
+    for (moving, code, at) in cases {
+        let (check, verify) = (Some(moving.clone()), Some(moving));
+        let check = CheckMotionsRequest { moving: check, ..free.clone() };
+        refused_with(clients.queries.check_motions(check).await, code, at);
+        let verify = VerifyMotionRequest { moving: verify, ..proof.clone() };
+        refused_with(clients.queries.verify_motion(verify).await, code, at);
+    }
+    let both = || Some(moving(&two, &[there; 2], &[there; 2]));
+    let check = || CheckMotionsRequest { moving: both(), ..free.clone() };
+    let found = clients.queries.check_motions(check()).await.expect("answered").into_inner();
+    assert_eq!(&found.verdicts[..], [Verdict::Free as u8]);
+    // A half-space cannot be carried either: by what moves, or by the robot.
+    let still = at(0.0, 0.0, 0.0);
+    for (holder, at) in [("post", "moving.names[0]"), ("other", "moving.names[1]"), ("one/hand", "robot")] {
+        let attach = Attach { name: "floor".into(), to: holder.into(), pose: Some(still), touch: vec![] };
+        client.update_scene("cell", &Update { attach: vec![attach], ..Update::default() }).await.expect("held");
+        refused(clients.queries.check_motions(check()).await, at);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

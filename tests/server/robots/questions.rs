@@ -1,9 +1,9 @@
 //! States and clearances by joint values, over the wire.
 
-use sublevel::client::StatesQuestion;
+use sublevel::client::{ClearanceQuestion, StatesQuestion};
 use sublevel::scene::query::StateVerdict;
 use sublevel::scene::{Subject, Update};
-use sublevel::service::proto::{ClearanceRequest, EvaluateRequest, Measure};
+use sublevel::service::proto::{CheckStatesRequest, ClearanceRequest, EvaluateRequest, Measure, Verdict};
 
 use super::{at, cell, joints, served};
 use crate::harness::{pair, question};
@@ -19,7 +19,7 @@ fn numbers(bytes: &[u8]) -> Vec<f64> {
 #[tokio::test(flavor = "multi_thread")]
 async fn states_by_joint_values_with_what_is_held() {
     let dir = tempfile::tempdir().expect("a directory");
-    let (_server, client, _clients, robot) = served(dir.path()).await;
+    let (_server, client, mut clients, robot) = served(dir.path()).await;
     cell(&client, &robot).await;
     // What the hand holds is 1.3 m from the joint: it meets the ball when the arm points along x.
     let put = |x: f64| Update { poses: vec![("post".into(), at(x, 0.0, 0.3))], ..Update::default() };
@@ -32,10 +32,41 @@ async fn states_by_joint_values_with_what_is_held() {
     assert_eq!(found.verdicts, [free, contact, invalid, invalid, free]);
     let pair = found.pairs[1].clone().expect("a pair");
     assert!(pair.contains(&"post".to_owned()), "{pair:?}");
+    // Which state is invalid, and why.
+    let not_finite = "joint_values[2]: joint lift is NaN; give a finite number";
+    let beyond = "joint_values[3]: joint lift is 2.1, outside its limits -2 to 2; give a value within them";
+    let reasons: Vec<Option<&str>> = found.reasons.iter().map(Option::as_deref).collect();
+    assert_eq!(reasons, [None, None, Some(not_finite), Some(beyond), None]);
+    let near = ClearanceQuestion::of_robot("one", [], 0.1).with_joint_values(&values);
+    let near = client.clearance("cell", near).await.expect("answered");
+    let of_near: Vec<Option<&str>> = near.states.iter().map(|state| state.reason.as_deref()).collect();
+    assert_eq!(of_near, reasons);
+    let good = [0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 1.0];
+    let [mut above, mut long] = [good; 2];
+    (above[2], long[6]) = (12.0, 2.0);
+    let poses = CheckStatesRequest {
+        scene: "cell".into(),
+        objects: vec!["held".into(), "post".into()],
+        poses: packed([good, above, good, long].as_flattened()),
+        ..Default::default()
+    };
+    let found = clients.queries.check_states(poses).await.expect("answered").into_inner();
+    assert_eq!(found.verdicts[..], [Verdict::Free, Verdict::Invalid].map(|verdict| verdict as u8));
+    let text = "poses[3]: object \"post\" has no usable pose: rotation is not a unit quaternion: its length deviates \
+                by 1.000e0, at most 1e-6 is accepted; normalise it";
+    assert_eq!(found.reasons, ["", text]);
     // The same of one joint: the slide is as in the scene.
     let one = StatesQuestion::of_robot("one", ["lift"]).with_joint_values(&[0.0, quarter]);
     let found = client.check_states("cell", one.clone()).await.expect("answered");
-    assert_eq!(found.verdicts, [free, contact]);
+    assert_eq!((found.verdicts, found.reasons), (vec![free, contact], vec![None; 2]));
+    let raw = CheckStatesRequest {
+        scene: "cell".into(),
+        robot: "one".into(),
+        joint_values: packed(&[0.0; 4]),
+        ..Default::default()
+    };
+    let found = clients.queries.check_states(raw).await.expect("answered").into_inner();
+    assert!(found.reasons.is_empty(), "valid states have none: {found:?}");
     // The ball is left out, or the robot is padded.
     let allow = Update {
         allow: vec![

@@ -107,6 +107,8 @@ async fn updates() {
     let instance = || RobotInstance { name: "three".into(), robot_id: id.clone(), base: Some(at(9.0)), joints: None };
     let both = JointValues { rows: vec![0.0], ..values(&["lift"], &[0.0]) };
     let of_link = Object { robot: "one".into(), ..object("x", &ball, at(0.0)) };
+    let held = Attachment { to: "two/flange".into(), pose: Some(at(0.0)), touch: Vec::new() };
+    let of_frame = Object { pose: None, attachment: Some(held), ..object("x", &ball, at(0.0)) };
     let (invalid, missing) = (Code::InvalidArgument, Code::NotFound);
     let cases = [
         (set("five", values(&[], &[0.0; 2])), missing, "set_joints[0].robot"),
@@ -149,7 +151,8 @@ async fn updates() {
         (attach("two/arm", "two/arm"), invalid, "attach[0].object"),
         (attach("two/arm", "two/hand"), invalid, "attach[0].object"),
         (attach("post", "post"), invalid, "attach[0].attachment.to"),
-        (attach("post", "two/flange"), missing, "attach[0].attachment.to"),
+        (attach("post", "two/flange"), invalid, "attach[0].attachment.to"),
+        (attach("post", "two/tool"), missing, "attach[0].attachment.to"),
         (attach("post", ""), invalid, "attach[0].attachment.to"),
         (attach("beam", "two/hand"), missing, "attach[0].object"),
         (
@@ -163,10 +166,14 @@ async fn updates() {
             "upsert_objects[0].name",
         ),
         (UpdateSceneRequest { upsert_objects: vec![of_link], ..update() }, invalid, "upsert_objects[0].robot"),
+        (UpdateSceneRequest { upsert_objects: vec![of_frame], ..update() }, invalid, "upsert_objects[0].attachment.to"),
     ];
     for (request, code, at) in cases {
         check(&clients.scenes.update_scene(request).await.expect_err(at), code, at);
     }
+    let frame = clients.scenes.update_scene(attach("post", "two/flange")).await.expect_err("a frame");
+    let why = "link \"flange\" of robot \"two\" has no geometry; attach to \"two/arm\" with the pose in its frame";
+    assert_eq!(frame.message(), format!("attach[0].attachment.to: {why}"));
     let holds = UpdateSceneRequest { remove_robots: vec!["one".into()], ..update() };
     let refused = clients.scenes.update_scene(holds).await.expect_err("it holds something");
     assert_eq!((refused.code(), reason(&refused).as_str()), (Code::FailedPrecondition, "OBJECT_HOLDS"));

@@ -76,7 +76,12 @@ impl Kinematics {
         self.variables().iter().position(|variable| &*variable.name == name)
     }
 
-    /// Checks that values are a configuration within the limits.
+    /// Checks that values are a configuration within the limits of the joints that have values.
+    ///
+    /// Limits of joints that follow another one do not count: a URDF has to write a `<limit>` for
+    /// them, too, in which what is missing is 0, so that many robots would have no configuration at
+    /// all. The values of a follower are bounded by the limits of the joint that it follows, as in
+    /// other readers of URDF.
     ///
     /// # Errors
     /// The first joint, in order, with a value that is not finite, outside its limits by more than

@@ -204,11 +204,15 @@ fn values_are_checked_by_name() {
     };
     let description = Description {
         name: "robot".into(),
-        links: ["base", "lift", "wheel", "free"].map(link).into(),
+        links: ["base", "lift", "wheel", "free", "finger"].map(link).into(),
         joints: vec![
             joint("lift", JointKind::Prismatic, 1, Some(Limits { lower: 0.5, upper: 1.5 })),
             joint("wheel", JointKind::Continuous, 2, Some(Limits { lower: 0.0, upper: 0.0 })),
             joint("free", JointKind::Floating, 3, None),
+            Joint {
+                mimic: Some(Mimic { joint: 0, multiplier: 2.0, offset: 0.0 }),
+                ..joint("finger", JointKind::Prismatic, 4, Some(Limits { lower: 0.0, upper: 0.0 }))
+            },
         ],
     };
     let kinematics = Kinematics::new(&description).expect("a tree");
@@ -225,6 +229,9 @@ fn values_are_checked_by_name() {
     assert_eq!(with(0, 1.5 + 1e-12), Ok(()));
     let beyond = ConfigurationError::Limits { joint: name("lift"), value: 1.51, lower: 0.5, upper: 1.5 };
     assert_eq!(with(0, 1.51), Err(beyond));
+    // The finger follows to twice as far, beyond the limits of its own, which do not count.
+    let finger = &kinematics.joints[3];
+    assert_eq!((finger.value(&defaults), with(0, 1.5)), (1.0, Ok(())));
     assert_eq!(
         with(3, f64::INFINITY),
         Err(ConfigurationError::NotFinite { joint: name("free"), value: f64::INFINITY })

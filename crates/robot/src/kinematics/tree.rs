@@ -213,6 +213,12 @@ impl Kinematics {
     pub fn parent(&self, link: usize) -> Option<usize> {
         Some(self.joints.get(link.checked_sub(1)?)?.parent)
     }
+
+    /// Whether a link is fixed to the link that it hangs on.
+    pub fn is_fixed(&self, link: usize) -> bool {
+        let joint = link.checked_sub(1).and_then(|joint| self.joints.get(joint));
+        joint.is_some_and(|joint| joint.kind == JointKind::Fixed)
+    }
 }
 
 /// A link without its collision geometry.

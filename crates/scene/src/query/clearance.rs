@@ -11,6 +11,7 @@ use sublevel_core::measure::{
 use super::answer::{Answer, Verdict};
 use super::ask::{Ask, AskError, Measure, options};
 use super::decide::decide;
+use super::invalid_state::InvalidState;
 use super::packed::State;
 use super::placed::{Candidate, JointValues, Other, Placed, with_starts};
 use super::solver::{Pair, Solids, Solver};
@@ -45,6 +46,8 @@ pub struct StateClearance {
     /// distance with respect to the values of the state, metres per unit of each; NaN where there
     /// are none.
     pub joint_gradients: Vec<f64>,
+    /// Why the poses or joint values are not usable, if they are not.
+    pub invalid: Option<Box<InvalidState>>,
 }
 
 /// For each of many states the pairs whose signed distance less their padding is below an influence
@@ -142,8 +145,11 @@ impl Clearance {
         (solver, at): (&Solver<'_>, &mut State),
         (place, batches): (usize, &mut Batches),
     ) -> StateClearance {
-        if solver.stop.is_set() || self.placed.place(state, at).is_none() {
+        if solver.stop.is_set() {
             return StateClearance::default();
+        }
+        if let Err(invalid) = self.placed.place(state, at) {
+            return StateClearance { invalid: Some(Box::new(invalid)), ..StateClearance::default() };
         }
         let mut rows = Vec::new();
         self.placed.visit(at, self.influence_m, |Candidate { index, other, threshold, slack_m }| {
@@ -168,7 +174,7 @@ impl Clearance {
             }
             !solver.stop.is_set()
         });
-        StateClearance { rows, checked: !solver.stop.is_set(), joint_gradients: Vec::new() }
+        StateClearance { rows, checked: !solver.stop.is_set(), ..StateClearance::default() }
     }
 
     fn row(&self, pair: [Slot; 2], answer: Answer, (threshold, slack_m): (f64, f64)) -> ClearanceRow {
@@ -180,7 +186,7 @@ impl Clearance {
         let Some(joints) = self.placed.joints().filter(|_| self.ask.gradients && !found.rows.is_empty()) else {
             return;
         };
-        if self.placed.place(index, at).is_none() {
+        if self.placed.place(index, at).is_err() {
             return;
         }
         let (width, mut all) = (joints.width(), Vec::new());

@@ -31,16 +31,23 @@ impl Bracket {
         Self { verdict, lower, upper, rungs: [0; 2], solved: true }
     }
 
-    /// What a decision says of the signed distance when it is compared with a threshold.
+    /// What a decision about the distance says of the signed distance when it is compared with a
+    /// threshold.
     fn decided(decision: Decision, threshold: f64) -> Self {
+        let found = Self::of_signed(decision, threshold);
+        // A distance of 0 says nothing about depth.
+        if found.lower > 0.0 || found.verdict != Verdict::Undecided {
+            return found;
+        }
+        Self { lower: f64::NEG_INFINITY, ..found }
+    }
+
+    /// The same of a decision about the signed distance itself.
+    fn of_signed(decision: Decision, threshold: f64) -> Self {
         match decision {
             Decision::Yes => Self::of(Verdict::Yes, f64::NEG_INFINITY, threshold),
             Decision::No => Self::of(Verdict::No, threshold, f64::INFINITY),
-            Decision::Undecided { lower, upper } => {
-                // A distance of 0 says nothing about depth.
-                let lower = if lower > 0.0 { lower } else { f64::NEG_INFINITY };
-                Self::of(Verdict::Undecided, lower, upper)
-            }
+            Decision::Undecided { lower, upper } => Self::of(Verdict::Undecided, lower, upper),
         }
     }
 }
@@ -63,7 +70,7 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
         | (Thing::HalfSpace(half_space), Thing::Solid { set: None, rungs, pose }) => {
             let Some(solid) = rungs.last() else { return Bracket::of(Verdict::Undecided, gap, f64::INFINITY) };
             let decision = solver.half_space_decision(solid, pose, half_space, threshold, (pair.slots, &options));
-            Bracket::decided(decision, threshold)
+            Bracket::of_signed(decision, threshold)
         }
         (Thing::Solid { set: None, rungs, pose }, Thing::Capsule { capsule, pose: capsule_pose })
             if threshold >= 0.0 =>

@@ -8,6 +8,7 @@ use sublevel_robot::{JointKind, Kinematics};
 use super::answer::{Answer, Verdict};
 use super::clearance::{Clearance, ClearanceRow, StateClearance};
 use super::decide::compare;
+use super::invalid_state::InvalidState;
 use super::least_change::least_change;
 use super::placed::JointValues;
 use super::states::{Certainty, StateVerdict, is_exact};
@@ -73,6 +74,8 @@ pub struct ExplainedState {
     /// Values of the joints that are named, near those that were asked about, with which the robot
     /// is free: proven. None of free states, of states that are poses, and where none were found.
     pub freed: Option<Vec<f64>>,
+    /// Why it is invalid, if it is.
+    pub invalid: Option<Box<InvalidState>>,
 }
 
 /// One state, with all its contacts.
@@ -298,11 +301,11 @@ impl Question for Explanation {
     }
 
     fn solve(&self, _: usize, stop: &Stop) -> ExplainedState {
-        let without = |verdict| ExplainedState { verdict, pairs: Vec::new(), freed: None };
-        let Some(near) = self.near(None, self.margin_m, stop) else { return without(StateVerdict::Invalid) };
-        let StateClearance { rows, joint_gradients, checked } = near;
-        if !checked && !stop.is_set() {
-            return without(StateVerdict::Invalid);
+        // It was accepted when it was asked.
+        let StateClearance { rows, joint_gradients, checked, invalid } =
+            self.near(None, self.margin_m, stop).unwrap_or_default();
+        if invalid.is_some() {
+            return ExplainedState { verdict: StateVerdict::Invalid, pairs: Vec::new(), freed: None, invalid };
         }
         let width = joint_gradients.len() / rows.len().max(1);
         let gradient = |row: usize| &joint_gradients[row * width..(row + 1) * width];
@@ -316,6 +319,6 @@ impl Question for Explanation {
             false => StateVerdict::Undecided,
         };
         let freed = if pairs.is_empty() || !checked { None } else { self.freed(stop) };
-        ExplainedState { verdict, pairs, freed }
+        ExplainedState { verdict, pairs, freed, invalid }
     }
 }

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
-use sublevel_core::measure::{Pose, Twist};
+use sublevel_core::measure::{Pose, PoseError, Twist};
 
+use super::invalid_state::InvalidState;
 use super::moving::Moving;
 use super::states_error::StatesError;
 use crate::poses::compose;
@@ -85,8 +86,12 @@ impl Packed {
         }
     }
 
-    /// Places all moving objects in a state; none if a number is no pose or no joint value.
-    pub(crate) fn place(&self, index: usize, moving: &[Moving], state: &mut State) -> Option<()> {
+    /// Places all moving objects in a state.
+    ///
+    /// # Errors
+    /// Numbers that are no pose or no joint values, and a link or a held object that is too far
+    /// away to have a pose.
+    pub(crate) fn place(&self, index: usize, moving: &[Moving], state: &mut State) -> Result<(), InvalidState> {
         state.poses.clear();
         state.errors.clear();
         match self {
@@ -95,26 +100,47 @@ impl Packed {
                 let numbers = &numbers[index * per_state..(index + 1) * per_state];
                 for pose in numbers.as_chunks::<POSE_NUMBERS>().0 {
                     let &[x, y, z, i, j, k, w] = pose;
-                    state.poses.push(Pose::from_quaternion(Vector3::new(x, y, z), [i, j, k, w]).ok()?);
+                    let pose = Pose::from_quaternion(Vector3::new(x, y, z), [i, j, k, w]);
+                    let at = state.poses.len();
+                    state.poses.push(pose.map_err(|error| self.no_pose(index, (moving, at), error))?);
                 }
             }
             Self::Joints(joints) => joints.place(index, moving, state)?,
         }
-        for held in &moving[state.poses.len()..] {
-            let (holder, place) = held.holder.as_ref()?;
-            state.poses.push(compose(&state.poses[*holder], place).ok()?);
+        // What is not placed by now is held.
+        for (at, held) in moving.iter().enumerate().skip(state.poses.len()) {
+            let Some((holder, place)) = &held.holder else { break };
+            let pose = compose(&state.poses[*holder], place);
+            state.poses.push(pose.map_err(|error| self.no_pose(index, (moving, at), error))?);
         }
         if let Self::Joints(joints) = self {
             let kinematics = joints.robot.kinematics();
             for (moving, pose) in moving.iter().zip(&state.poses) {
-                let link = moving.link?;
-                let error = link_error_m(kinematics, &state.links, &state.configuration, link, moving.reach_m);
+                let error = moving.link.map_or(f64::INFINITY, |link| {
+                    link_error_m(kinematics, &state.links, &state.configuration, link, moving.reach_m)
+                });
                 let products = f64::from(moving.holders);
                 let held = products * ROUNDING * (moving.reach_m + pose.translation().norm());
                 state.errors.push(error + held);
             }
         }
-        Some(())
+        Ok(())
+    }
+
+    /// Why a state is invalid in which a moving object, by its position, has no pose.
+    #[cold]
+    fn no_pose(&self, index: usize, (moving, at): (&[Moving], usize), error: PoseError) -> InvalidState {
+        let pose = match self {
+            Self::Poses { objects, .. } => {
+                let mut named = at;
+                while let Some((holder, _)) = &moving[named].holder {
+                    named = *holder;
+                }
+                Some(index * objects + named)
+            }
+            Self::Joints(_) => None,
+        };
+        InvalidState::Pose { object: moving[at].object.name.clone(), pose, error }
     }
 
     /// The states where they are joint values.
@@ -127,7 +153,7 @@ impl Packed {
 }
 
 impl JointStates {
-    fn place(&self, index: usize, moving: &[Moving], state: &mut State) -> Option<()> {
+    fn place(&self, index: usize, moving: &[Moving], state: &mut State) -> Result<(), InvalidState> {
         state.configuration.clear();
         state.configuration.extend_from_slice(&self.rest);
         let width = self.places.len();
@@ -135,12 +161,15 @@ impl JointStates {
             state.configuration[*place] = *value;
         }
         let kinematics = self.robot.kinematics();
-        kinematics.check(&state.configuration).ok()?;
+        kinematics.check(&state.configuration)?;
         kinematics.forward(&self.base, &state.configuration, &mut state.links);
         for moving in moving.iter().take_while(|moving| moving.holder.is_none()) {
-            state.poses.push(pose_of(&state.links[moving.link?]).ok()?);
+            let Some(link) = moving.link else { break };
+            let pose = pose_of(&state.links[link]);
+            let no_pose = |error| InvalidState::Pose { object: moving.object.name.clone(), pose: None, error };
+            state.poses.push(pose.map_err(no_pose)?);
         }
-        Some(())
+        Ok(())
     }
 
     /// Number of values of a state.

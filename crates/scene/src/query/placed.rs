@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use sublevel_core::measure::Pose;
 
+use super::invalid_state::InvalidState;
 use super::moving::Moving;
 use super::packed::{JointStates, POSE_NUMBERS, Packed, State};
 use super::states_error::StatesError;
@@ -131,8 +132,11 @@ impl Placed {
         self.packed.len()
     }
 
-    /// Places all moving objects in a state; none if a number is no pose or no joint value.
-    pub(crate) fn place(&self, index: usize, state: &mut State) -> Option<()> {
+    /// Places all moving objects in a state.
+    ///
+    /// # Errors
+    /// A number that is no pose or no joint value.
+    pub(crate) fn place(&self, index: usize, state: &mut State) -> Result<(), InvalidState> {
         self.packed.place(index, &self.moving, state)
     }
 

@@ -101,23 +101,28 @@ impl Solver<'_> {
         let ball = solid.circumscribed();
         let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
         self.warm(slots, [0; 2], Measure::Signed, |warm| {
+            if slack == 0.0 && threshold == 0.0 {
+                return overlap_with_half_space(solid, pose, plane, options, warm);
+            }
+            // Only thresholds that are no numbers are refused.
             let mut below = |threshold: f64| {
-                if threshold == 0.0 {
-                    return overlap_with_half_space(solid, pose, plane, options, warm);
-                }
-                // Only thresholds that are no numbers are refused.
                 nearer_to_half_space_than(solid, pose, plane, threshold, options, warm).unwrap_or(open)
             };
             if slack == 0.0 {
                 return below(threshold);
             }
-            match below(threshold + slack) {
-                Decision::No => Decision::No,
-                _ => match below(threshold - slack) {
-                    Decision::No => open,
-                    other => other,
+            // What holds of this plane by that much more holds of all.
+            let (least, most) = ((threshold - slack).next_down(), (threshold + slack).next_up());
+            let known = match below(most) {
+                Decision::No => return Decision::No,
+                Decision::Undecided { lower, upper } => [lower, upper],
+                Decision::Yes => match below(least) {
+                    Decision::Yes => return Decision::Yes,
+                    Decision::Undecided { lower, upper } => [lower, upper],
+                    Decision::No => [least, most],
                 },
-            }
+            };
+            Decision::Undecided { lower: (known[0] - slack).next_down(), upper: (known[1] + slack).next_up() }
         })
     }
 }

@@ -8,6 +8,7 @@ use super::answer::Verdict;
 use super::ask::{Ask, AskError, Measure, check_accuracy, options};
 use super::certain::decide_within;
 use super::decide::{Bracket, decide};
+use super::invalid_state::InvalidState;
 use super::packed::State;
 use super::placed::{Candidate, JointValues, Other, Placed, with_starts};
 use super::solver::{Pair, Solver};
@@ -27,7 +28,7 @@ pub enum StateVerdict {
     Contact,
     /// Neither is proven.
     Undecided,
-    /// A pose is none, or a joint value is not finite or outside its limits.
+    /// A pose is none, or a joint value is not finite or outside its limits; the answer says which.
     Invalid,
     /// The question ended before.
     NotChecked,
@@ -45,7 +46,7 @@ pub enum Certainty {
 }
 
 /// What is known of a state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct StateAnswer {
     /// What it is.
     pub verdict: StateVerdict,
@@ -59,12 +60,14 @@ pub struct StateAnswer {
     pub upper_m: f64,
     /// Pairs that had to be solved.
     pub solved: u32,
+    /// Why it is invalid, if it is.
+    pub invalid: Option<Box<InvalidState>>,
 }
 
 impl StateAnswer {
     fn without(verdict: StateVerdict) -> Self {
         let (lower_m, upper_m) = (f64::NAN, f64::NAN);
-        Self { verdict, certainty: Certainty::None, pair: None, lower_m, upper_m, solved: 0 }
+        Self { verdict, certainty: Certainty::None, pair: None, lower_m, upper_m, solved: 0, invalid: None }
     }
 }
 
@@ -172,8 +175,8 @@ impl States {
         if self.stop_at_first && self.first_bad.load(Ordering::Relaxed) < state || solver.stop.is_set() {
             return StateAnswer::without(StateVerdict::NotChecked);
         }
-        if self.placed.place(state, place).is_none() {
-            return StateAnswer::without(StateVerdict::Invalid);
+        if let Err(invalid) = self.placed.place(state, place) {
+            return StateAnswer { invalid: Some(Box::new(invalid)), ..StateAnswer::without(StateVerdict::Invalid) };
         }
         let answer = if self.worst { self.worst_pair(solver, place) } else { self.first_contact(solver, place, last) };
         if solver.stop.is_set() && answer.verdict != StateVerdict::Contact {
@@ -191,7 +194,7 @@ impl States {
             let found = self.decide(solver, &pair, contact);
             answer.solved += u32::from(found.solved);
             if found.verdict == Verdict::Yes {
-                return self.settled(answer, slots, &found);
+                return self.settled(answer.solved, slots, &found);
             }
         }
         *last = None;
@@ -202,13 +205,13 @@ impl States {
             match found.verdict {
                 Verdict::No => true,
                 Verdict::Yes => {
-                    answer = self.settled(answer, slots, &found);
+                    answer = self.settled(answer.solved, slots, &found);
                     *last = Some(candidate);
                     false
                 }
                 Verdict::Undecided => {
                     if answer.verdict == StateVerdict::Free {
-                        answer = self.settled(answer, slots, &found);
+                        answer = self.settled(answer.solved, slots, &found);
                     }
                     true
                 }
@@ -257,12 +260,12 @@ impl States {
             }
             if value - padding < least {
                 least = value - padding;
-                answer = self.settled(answer, slots, &bracket);
+                answer = self.settled(solved, slots, &bracket);
             }
         }
         // The pair with the least value may be free while a wider bracket is not.
         if let Some((slots, bracket, _)) = doubtful.filter(|_| answer.verdict == StateVerdict::Free) {
-            answer = self.settled(answer, slots, &bracket);
+            answer = self.settled(solved, slots, &bracket);
         }
         answer.solved = solved;
         answer
@@ -286,7 +289,7 @@ impl States {
         Some((Pair { a, b, slots: Some(PairSlots { a: slot, b: other }) }, [slot, other]))
     }
 
-    fn settled(&self, answer: StateAnswer, pair: [Slot; 2], found: &Bracket) -> StateAnswer {
+    fn settled(&self, solved: u32, pair: [Slot; 2], found: &Bracket) -> StateAnswer {
         let verdict = match found.verdict {
             Verdict::Yes => StateVerdict::Contact,
             Verdict::No => StateVerdict::Free,
@@ -297,7 +300,8 @@ impl States {
             StateVerdict::Contact | StateVerdict::Undecided => Certainty::Possible,
             _ => Certainty::None,
         };
-        StateAnswer { verdict, certainty, pair: Some(pair), lower_m: found.lower, upper_m: found.upper, ..answer }
+        let (lower_m, upper_m) = (found.lower, found.upper);
+        StateAnswer { verdict, certainty, pair: Some(pair), lower_m, upper_m, solved, invalid: None }
     }
 
     fn is_exact(&self, slot: Slot) -> bool {

@@ -5,6 +5,7 @@
 //! every link with geometry into the scene, named `INSTANCE/LINK`, of the group `INSTANCE`.
 
 mod derived_pairs;
+mod frame_link;
 mod id;
 mod instance;
 mod joints;
@@ -17,6 +18,8 @@ mod placement;
 mod update;
 
 pub use derived_pairs::{DeriveProgress, DerivedLinks};
+pub use frame_link::FrameHolder;
+pub(crate) use frame_link::FrameLink;
 pub use id::{ParseRobotIdError, RobotId};
 pub use instance::RobotInstance;
 pub(crate) use instance::{Instance, Stance};

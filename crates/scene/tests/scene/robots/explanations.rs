@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
-use sublevel_core::measure::Pose;
-use sublevel_scene::query::{ExplainedState, Explanation, JointValues, StateVerdict, States, StatesError};
+use sublevel_core::measure::{Pose, PoseError};
+use sublevel_scene::query::{
+    ExplainedState, Explanation, InvalidState, JointValues, StateVerdict, States, StatesError,
+};
 use sublevel_scene::{Crew, Scene, Slot, Update};
 use sublevel_testkit::Seeded;
 use sublevel_testkit::random::at;
@@ -155,6 +157,23 @@ fn what_is_no_single_state_is_refused() {
     )
     .map(drop);
     assert!(matches!(nobody, Err(StatesError::NoRobot(_))));
-    assert_eq!(explained(&scene, &["bend"], &[f64::NAN], 0.0).verdict, StateVerdict::Invalid);
-    assert_eq!(explained(&scene, &["bend"], &[9.0], 0.0).verdict, StateVerdict::Invalid);
+}
+
+#[test]
+fn invalid_states_are_explained_by_what_is_wrong() {
+    let scene = cell(&[]);
+    for (value, why) in [
+        (f64::NAN, "joint bend is NaN; give a finite number"),
+        (9.0, "joint bend is 9, outside its limits -3 to 3; give a value within them"),
+    ] {
+        let found = explained(&scene, &["bend"], &[value], 0.0);
+        assert_eq!((found.verdict, found.pairs.len(), found.freed), (StateVerdict::Invalid, 0, None));
+        assert_eq!(found.invalid.expect("a reason").to_string(), why);
+    }
+    assert_eq!(explained(&scene, &["bend"], &[0.1], 0.0).invalid, None);
+    let row = vec![5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 2.0];
+    let question = Explanation::new(scene.clone(), &[slot(&scene, "ball")], row, 0.0, false).expect("a state");
+    let found = Crew::new(1).expect("threads").ask(Arc::new(question), Arc::default()).expect("answered").remove(0);
+    let expected = InvalidState::Pose { object: "ball".into(), pose: Some(0), error: PoseError::NotUnit(1.0) };
+    assert_eq!((found.verdict, found.invalid.as_deref()), (StateVerdict::Invalid, Some(&expected)));
 }

@@ -6,7 +6,8 @@ use std::sync::Arc;
 use sublevel_core::measure::HalfSpace;
 use sublevel_robot::{Semantics, read_urdf};
 use sublevel_scene::{
-    Attach, Entry, Geometry, JointsError, List, NamedHalfSpace, Part, Robot, RobotError, RobotId, SceneError, Update,
+    Attach, Attachment, Entry, FrameHolder, Geometry, JointsError, List, NamedHalfSpace, Part, Placement, Robot,
+    RobotError, RobotId, SceneError, Update,
 };
 use sublevel_testkit::random::at;
 
@@ -70,6 +71,42 @@ fn nothing_is_held_by_itself() {
     let missing = refused(attach("ball", "arm/knee"));
     assert_eq!(missing, SceneError::NoObject { at: held_by(List::Attach), name: "arm/knee".into() });
     assert_eq!(held_by(List::Attach).to_string(), "Attach[0].attachment.to");
+}
+
+#[test]
+fn links_without_geometry_hold_nothing_and_name_who_can() {
+    let attach = |to: &str| Attach { name: "ball".into(), to: to.into(), pose: None, touch: Vec::new() };
+    let frame = |list, link: &str, robot: &str, instead| SceneError::FrameLink {
+        at: held_by(list),
+        link: link.into(),
+        robot: robot.into(),
+        instead,
+    };
+    let fixed = FrameHolder::Fixed("arm/upper".into());
+    let error = refused(Update { attach: vec![attach("arm/elbow")], ..Update::default() });
+    assert_eq!(error, frame(List::Attach, "elbow", "arm", fixed.clone()));
+    let text = "link \"elbow\" of robot \"arm\" has no geometry; attach to \"arm/upper\" with the pose in its frame";
+    assert_eq!(error.to_string(), text);
+    // The tip slides against the wrist.
+    let error = refused(Update { attach: vec![attach("arm/tip")], ..Update::default() });
+    assert_eq!(error, frame(List::Attach, "tip", "arm", FrameHolder::Moving("arm/wrist".into())));
+    assert!(error.to_string().contains("it moves against \"arm/wrist\""), "{error}");
+    // An object that is placed where it is held, and a robot that begins with a frame.
+    let attachment = Attachment { to: "arm/elbow".into(), pose: at(0.0, 0.0, 0.1), touch: Vec::new() };
+    let part = placement("part", &things()[0], at(0.0, 0.0, 0.0));
+    let part = Placement { pose: None, attachment: Some(attachment), ..part };
+    let error = refused(Update { upserts: vec![part], ..Update::default() });
+    assert_eq!(error, frame(List::Upserts, "elbow", "arm", fixed));
+    let body = "<collision><geometry><box size=\"0.3 0.3 0.2\"/></geometry></collision></link>";
+    let urdf = ARM.replace(&format!("<link name=\"base\">{body}"), "<link name=\"base\"/>");
+    let description = read_urdf(&urdf).expect("a description");
+    assert!(description.links[0].collisions.is_empty());
+    let (id, bodies) = (RobotId::of(&urdf, "", []), BTreeMap::new());
+    let leg = Arc::new(Robot::new(id, &description, &Semantics::default(), &bodies).expect("a robot"));
+    let leg = place("leg", &leg, at(3.0, 0.0, 0.0));
+    let error = refused(Update { robots: vec![leg], attach: vec![attach("leg/base")], ..Update::default() });
+    assert_eq!(error, frame(List::Attach, "base", "leg", FrameHolder::None));
+    assert!(error.to_string().ends_with("attach to a link with geometry"), "{error}");
 }
 
 #[test]

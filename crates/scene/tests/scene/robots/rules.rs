@@ -25,7 +25,7 @@ pub(super) fn verdict(scene: &Scene, margin_m: f64) -> (StateVerdict, Option<[St
     )
     .expect("states");
     let crew = Crew::new(1).expect("threads");
-    let answer = crew.ask(Arc::new(question), Arc::default()).expect("answered").concat()[0];
+    let answer = crew.ask(Arc::new(question), Arc::default()).expect("answered").concat().remove(0);
     let name = |slot| scene.object(slot).expect("there").name.to_string();
     (answer.verdict, answer.pair.map(|pair| pair.map(name)))
 }

@@ -3,8 +3,12 @@
 use std::sync::Arc;
 
 use nalgebra::Vector3;
-use sublevel_scene::query::{Clearance, JointValues, StateAnswer, StateClearance, StateVerdict, States, StatesError};
-use sublevel_scene::{Crew, Question, Scene, Slot, Update};
+use sublevel_core::measure::PoseError;
+use sublevel_robot::ConfigurationError;
+use sublevel_scene::query::{
+    Clearance, InvalidState, JointValues, StateAnswer, StateClearance, StateVerdict, States, StatesError,
+};
+use sublevel_scene::{Attach, Crew, Question, Scene, Slot, Update};
 use sublevel_testkit::Seeded;
 use sublevel_testkit::random::at;
 
@@ -120,6 +124,58 @@ fn values_that_are_none_make_a_state_invalid_and_no_other() {
     assert_eq!(found, [free, invalid, invalid, invalid, free]);
     let found = clearance(&scene, &[], packed.as_flattened());
     assert_eq!(found.iter().map(|state| state.checked).collect::<Vec<_>>(), [true, false, false, false, true]);
+    // Which joint, and why; of valid states nothing.
+    let limits = |joint: &str, value: f64, lower: f64, upper: f64| {
+        InvalidState::Joints(ConfigurationError::Limits { joint: joint.into(), value, lower, upper })
+    };
+    let of_states = states(&scene, &[], packed.as_flattened());
+    for (answer, near) in of_states.iter().zip(&found) {
+        assert_eq!(answer.invalid.as_ref().map(ToString::to_string), near.invalid.as_ref().map(ToString::to_string));
+    }
+    let said: Vec<Option<InvalidState>> = of_states.into_iter().map(|answer| answer.invalid.map(|why| *why)).collect();
+    let not_finite = said[1].as_ref().expect("a reason");
+    assert_eq!(not_finite.to_string(), "joint shoulder is NaN; give a finite number");
+    let expected = [limits("shoulder", 2.6, -2.5, 2.5), limits("slide", -0.01, 0.0, 0.05)].map(Some);
+    assert_eq!((&said[2..4], &said[0], &said[4]), (&expected[..], &None, &None));
+    // A state of some joints is counted whole, and names its own.
+    let of_one = states(&scene, &["bend"], &[0.0, 3.5]);
+    assert_eq!(of_one[1].invalid.as_deref(), Some(&limits("bend", 3.5, -3.0, 3.0)));
+}
+
+#[test]
+fn poses_that_are_none_make_a_state_invalid_and_no_other() {
+    // What the ball holds reaches farther than poses do when the ball is there.
+    let attach = Attach { name: "held".into(), to: "ball".into(), pose: Some(at(2e14, 0.0, 0.0)), touch: Vec::new() };
+    let held = placement("held", &things()[1], at(0.0, 0.0, 0.0));
+    let update = Update { upserts: vec![held], ..Update::default() };
+    let scene = applied(&applied(&cell(&[]), &update), &Update { attach: vec![attach], ..Update::default() });
+    // Two objects a state: the tool, which is held by the wrist, and the ball.
+    let slots = [slot(&scene, "tool"), slot(&scene, "ball")];
+    let good = [9.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0];
+    let [mut nan, mut long, mut far, mut aside] = [good; 4];
+    (nan[1], long[6], far[0], aside[0]) = (f64::NAN, 1.5, 9e14, -9.0);
+    let packed = [aside, good, aside, nan, long, good, aside, far];
+    let pose = |object: &str, pose: usize, error: PoseError| {
+        Some(InvalidState::Pose { object: object.into(), pose: Some(pose), error })
+    };
+    let expected = [
+        None,
+        pose("ball", 3, PoseError::NotFinite { field: "translation" }),
+        pose("tool", 4, PoseError::NotUnit(0.5)),
+        pose("held", 7, PoseError::TooFar(9e14 + 2e14)),
+    ];
+    let numbers = packed.as_flattened().to_vec();
+    let found = ask(States::new(scene.clone(), &slots, numbers.clone(), 0.0, false).expect("states"));
+    for (state, (answer, expected)) in found.iter().zip(&expected).enumerate() {
+        assert_eq!(answer.invalid.as_deref(), expected.as_ref(), "{state}");
+        assert_eq!(answer.verdict == StateVerdict::Invalid, expected.is_some(), "{state}: {answer:?}");
+    }
+    let text = "object \"tool\" has no usable pose: rotation is not a unit quaternion";
+    assert!(found[2].invalid.as_ref().expect("a reason").to_string().starts_with(text));
+    let found = ask(Clearance::new(scene.clone(), &slots, numbers, 0.1, false).expect("states"));
+    for (state, (near, expected)) in found.iter().zip(&expected).enumerate() {
+        assert_eq!((near.invalid.as_deref(), near.checked), (expected.as_ref(), expected.is_none()), "{state}");
+    }
 }
 
 #[test]
@@ -208,7 +264,7 @@ fn what_rounding_may_change_is_not_decided() {
     {
         let up = Update { poses: vec![("ball".into(), at(1.0, 0.0, height))], ..Update::default() };
         let scene = applied(&cell(&[]), &up);
-        let found = states(&scene, &[], &[0.0; 4])[0];
+        let found = states(&scene, &[], &[0.0; 4]).remove(0);
         assert_eq!(found.verdict, expected, "{found:?}");
         if expected != StateVerdict::Free {
             assert_eq!(found.pair, Some([slot(&scene, "tool"), slot(&scene, "ball")]));
