@@ -23,9 +23,9 @@ struct Running {
 pub struct Progress {
     /// What it is doing.
     pub phase: Phase,
-    /// Programs begun.
+    /// Programs begun; of a search through pairs of links, the pairs begun.
     pub rounds: u64,
-    /// Iterations of all of them.
+    /// Iterations of all of them; of pairs of links, the boxes of joint values looked at.
     pub iterations: u64,
     /// See [`fit::Progress::gap`].
     pub gap: f64,
@@ -88,6 +88,15 @@ impl Board {
         *last = said;
         !(running.stop || self.stopping)
     }
+
+    /// Notes how far a search through pairs of links is: pairs begun, and boxes of joint values
+    /// looked at in all of them. Tells whether to go on, as [`Board::note`] does.
+    pub(super) fn note_boxes(&mut self, job: u64, pairs: u64, boxes: u64) -> bool {
+        let Some(running) = self.running.as_mut().filter(|running| running.job == job) else { return false };
+        let phase = Phase::Solving;
+        running.progress = Progress { phase, rounds: pairs, iterations: boxes, ..Progress::default() };
+        !(running.stop || self.stopping)
+    }
 }
 
 #[cfg(test)]
@@ -124,7 +133,8 @@ mod tests {
         board.begin(2);
         assert!(!board.note(1, Phase::Solving, said), "it is not the running one any more");
         assert!(board.note(2, Phase::Solving, said));
+        assert!(board.note_boxes(2, 3, 70) && !board.note_boxes(1, 3, 70));
         board.stop_all();
-        assert!(!board.note(2, Phase::Solving, said));
+        assert!(!board.note(2, Phase::Solving, said) && !board.note_boxes(2, 3, 70));
     }
 }

@@ -127,3 +127,84 @@ pub fn exact_parts(link: &Link) -> Result<Vec<Body>, PrimitiveError> {
     }
     Ok(parts)
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, UnitQuaternion};
+    use sublevel_testkit::Seeded;
+
+    use super::*;
+    use crate::robot::read_urdf;
+
+    /// Three edges along the axes, 1, 2 and 3 m, and the triangles between them as they are seen
+    /// from outside. Its volume is 1 m³, and no mirror image of it is a rotated copy.
+    fn tetrahedron() -> Arc<Mesh> {
+        let points = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]].map(Vector3::from);
+        Arc::new(Mesh { points: points.into(), triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]] })
+    }
+
+    /// The volume that triangles enclose, m³; negative where they are seen from inside.
+    fn volume_m3(mesh: &Mesh) -> f64 {
+        let of = |corners: &[usize; 3]| {
+            let [a, b, c] = corners.map(|corner| mesh.points[corner]);
+            a.dot(&b.cross(&c)) / 6.0
+        };
+        mesh.triangles.iter().map(of).sum()
+    }
+
+    #[test]
+    fn meshes_of_links_are_scaled_mirrored_and_placed() {
+        // Scaled and mirrored first; then a quarter turn about x and one about z take x, y, z to
+        // z, x, y.
+        let urdf = r#"<robot name="robot"><link name="link">
+          <collision><origin xyz="1 2 3" rpy="1.5707963267948966 0 1.5707963267948966"/>
+            <geometry><mesh filename="mirrored.stl" scale="1 -1 3"/></geometry></collision>
+          <collision><geometry><sphere radius="1"/></geometry></collision>
+          <collision><geometry><mesh filename="plain.stl"/></geometry></collision>
+        </link></robot>"#;
+        let description = read_urdf(urdf).expect("a robot");
+        let [link] = &description.links[..] else { panic!("{description:?}") };
+        let mut files = Vec::new();
+        let mesh = link_mesh(link, |uri| {
+            files.push(uri.to_owned());
+            Ok::<_, String>(tetrahedron())
+        });
+        let mesh = mesh.expect("a mesh");
+        assert_eq!(files, ["mirrored.stl", "plain.stl"]);
+        let mirrored = [[1.0, 2.0, 3.0], [1.0, 3.0, 3.0], [1.0, 2.0, 1.0], [10.0, 2.0, 3.0]].map(Vector3::from);
+        let expected = [&mirrored[..], &tetrahedron().points].concat();
+        assert_eq!(mesh.points.len(), expected.len());
+        for (point, expected) in mesh.points.iter().zip(&expected) {
+            assert!((point - expected).norm() < 1e-13, "{point} {expected}");
+        }
+        // Two corners of each mirrored triangle change places; the others come behind them.
+        let mirrored = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+        let plain = [[4, 6, 5], [4, 5, 7], [4, 7, 6], [5, 6, 7]];
+        assert_eq!(mesh.triangles, [mirrored, plain].concat());
+        assert!((volume_m3(&mesh) - 4.0).abs() < 1e-12, "three times the volume, and once: {}", volume_m3(&mesh));
+        let refused = link_mesh(link, |uri| if uri == "plain.stl" { Err("gone") } else { Ok(tetrahedron()) });
+        assert_eq!(refused, Err("gone"));
+    }
+
+    /// For every choice of mirrored axes: triangles of a mesh that is seen from inside out would
+    /// enclose a negative volume.
+    #[test]
+    fn mirrored_meshes_are_seen_from_outside() {
+        let mut seeded = Seeded(11);
+        for mirrored in 0..8 {
+            let factor = |axis: usize| if mirrored >> axis & 1 == 1 { -1.0 } else { 1.0 };
+            let scale = Vector3::from_fn(|axis, _| factor(axis) * seeded.between(0.5, 2.0));
+            let turn = UnitQuaternion::from_scaled_axis(seeded.unit() * 2.0);
+            let origin = Isometry3::from_parts((seeded.unit() * 3.0).into(), turn);
+            let geometry = Piece::Mesh { uri: "it.stl".into(), scale };
+            let link = Link { name: "link".into(), collisions: vec![Collision { origin, geometry }] };
+            let mesh = link_mesh(&link, |_| Ok::<_, String>(tetrahedron())).expect("a mesh");
+            let (volume, expected) = (volume_m3(&mesh), scale.product().abs());
+            assert!((volume - expected).abs() < 1e-12, "{scale}: {volume} {expected}");
+            for (point, before) in mesh.points.iter().zip(&tetrahedron().points) {
+                let expected = turn * before.component_mul(&scale) + origin.translation.vector;
+                assert!((point - expected).norm() < 1e-13, "{scale}: {point} {expected}");
+            }
+        }
+    }
+}

@@ -6,8 +6,12 @@ use nalgebra::Vector3;
 use tokio::task::spawn_blocking;
 
 use super::worker::{claim, ended, finish, put_back, recover};
-use super::{Jobs, fit_group, fit_mesh};
-use crate::store::{Catalogue, FitBody, FitGroup, FitPolynomial, FitRequest, JobOutcome, JobState, NewJob, Store};
+use super::{Jobs, Phase, Progress, fit_group, fit_mesh};
+use crate::robot::motion::PairClass;
+use crate::store::{
+    Catalogue, DeriveOutcome, DeriveRequest, FitBody, FitGroup, FitPolynomial, FitRequest, JobOutcome, JobState,
+    NewJob, RobotSource, Store,
+};
 use sublevel_testkit::Seeded;
 
 fn request(degree: usize) -> FitRequest {
@@ -146,4 +150,49 @@ fn a_request_about_bodies_is_not_executed_on_a_mesh_nor_the_other_way_round() {
         let why = failed.expect_err("the wrong mode").to_string();
         assert!(why.starts_with("group: "), "{why}");
     }
+}
+
+/// A ball that goes round another one by two joints, 0.5 m away from it everywhere: where this is
+/// the margin, no search through boxes of joint values is over before its last box.
+const ORBIT: &str = r#"<robot name="orbit">
+  <link name="base"><collision><geometry><sphere radius="0.25"/></geometry></collision></link>
+  <link name="middle"><collision><geometry><sphere radius="0.125"/></geometry></collision></link>
+  <link name="tip"><collision><origin xyz="1 0 0"/><geometry><sphere radius="0.25"/></geometry></collision></link>
+  <joint name="a" type="continuous"><parent link="base"/><child link="middle"/><axis xyz="0 0 1"/></joint>
+  <joint name="b" type="continuous"><parent link="middle"/><child link="tip"/><axis xyz="0 1 0"/></joint>
+</robot>"#;
+
+/// What the job of a search through the pairs of [`ORBIT`] finds, and how far it says that it is;
+/// `stopped` before it begins or not.
+fn searched(stopped: bool) -> (DeriveOutcome, Progress) {
+    let dir = tempfile::tempdir().expect("a directory");
+    let catalogue = Catalogue::load(Store::open(dir.path()).expect("a new catalogue")).expect("loads");
+    let source = RobotSource { urdf: ORBIT.into(), ..RobotSource::default() };
+    let robot = *catalogue.load_robot(source).expect("a robot").0.robot.id();
+    let request = DeriveRequest { robot, margin_m: 0.5, max_boxes: 1000, resolution_m: 1e-3 };
+    catalogue.create_job(NewJob::derive(String::new(), request)).expect("queued");
+    let job = claim(&catalogue).expect("the disk works").expect("a job");
+    let jobs = Jobs::default();
+    jobs.tell(|board| board.begin(job.id));
+    if stopped {
+        jobs.tell(|board| board.stop(job.id));
+    }
+    let (found, bodies) = jobs.execute(&catalogue, &job).expect("pairs");
+    let JobOutcome::Derive(found) = found else { panic!("{found:?}") };
+    assert!(bodies.is_empty(), "it makes none");
+    let progress = jobs.news().borrow().progress(job.id).expect("it is on the board");
+    (found, progress)
+}
+
+#[test]
+fn a_search_through_pairs_counts_all_boxes_and_ends_when_it_is_stopped() {
+    let (found, progress) = searched(false);
+    let looked_at = found.pairs.iter().map(|pair| (pair.class, pair.boxes));
+    let adjacent = (PairClass::Adjacent, 1);
+    assert_eq!(looked_at.collect::<Vec<_>>(), [adjacent, (PairClass::Undecided, 1000), adjacent]);
+    // The last report is that the third pair begins.
+    assert_eq!(progress, Progress { phase: Phase::Solving, rounds: 3, iterations: 1001, ..Progress::default() });
+    let (found, progress) = searched(true);
+    assert!(found.pairs.len() == 3 && found.pairs.iter().all(|pair| pair.boxes == 0), "{found:?}");
+    assert_eq!(progress.iterations, 0);
 }

@@ -99,11 +99,12 @@ impl Jobs {
         if catalogue.job(job.id).is_none_or(|now| now.state.is_final()) {
             return Err("it was cancelled".into());
         }
-        let progress = |phase: Phase, said: fit::Progress| {
+        let tell = |note: &dyn Fn(&mut Board) -> bool| {
             let mut goes_on = true;
-            self.tell(|board| goes_on = board.note(job.id, phase, said));
+            self.tell(|board| goes_on = note(board));
             if goes_on { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
         };
+        let progress = |phase: Phase, said: fit::Progress| tell(&|board| board.note(job.id, phase, said));
         match &job.task {
             JobTask::Fit(FitTask { request, .. }) => {
                 let made = fit(catalogue, job.id, request, progress)?;
@@ -115,14 +116,21 @@ impl Jobs {
                 Ok((JobOutcome::Hierarchy(found.map_err(|error| error.to_string())?), Vec::new()))
             }
             JobTask::Derive(request) => {
-                let loaded = catalogue.robot(&request.robot).map_err(|error| error.to_string())?;
+                let loaded = catalogue.robot(&request.robot).map_err(|error| match error {
+                    CatalogueError::NoRobot(id) => format!("robot {id} was deleted meanwhile; load it again"),
+                    error => error.to_string(),
+                })?;
+                let mut boxes = 0;
+                // Asked before each box.
                 let found = derive::derive(request, &loaded, &mut |at| {
-                    // Everybody who waits for news wakes up at each.
-                    if at.boxes % BOXES_TOLD != 0 {
-                        return ControlFlow::Continue(());
-                    }
-                    let (round, iterations) = (at.done + 1, at.boxes as usize + 1);
-                    progress(Phase::Solving, fit::Progress { round, iterations, ..fit::Progress::default() })
+                    let (pairs, looked_at) = ((at.done + 1) as u64, boxes);
+                    // Everybody who waits for news wakes up at each report.
+                    let said = match at.boxes % BOXES_TOLD {
+                        0 => tell(&|board| board.note_boxes(job.id, pairs, looked_at)),
+                        _ => ControlFlow::Continue(()),
+                    };
+                    boxes += u64::from(said.is_continue());
+                    said
                 });
                 Ok((JobOutcome::Derive(found.map_err(|error| error.to_string())?), Vec::new()))
             }

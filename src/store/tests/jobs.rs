@@ -2,15 +2,19 @@
 //! given twice.
 
 use nalgebra::Vector3;
+use sha2::{Digest, Sha256};
 
 use super::{Disk, ball};
 use crate::body::Body;
 use crate::measure::Pose;
+use crate::robot::motion::PairClass;
+use crate::scene::RobotId;
 use crate::store::rows::{JOBS, META, POINTS, TRIANGLES};
 use crate::store::{
-    Catalogue, CatalogueError, FitGroup, FitOutcome, FitPolynomial, FitPreparation, FitRequest, FitTask, FitWithinGap,
-    FittedKind, HierarchyMeasure, HierarchyOutcome, HierarchyRequest, HierarchySet, Job, JobOutcome, JobState, JobTask,
-    MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob, StoreError,
+    Catalogue, CatalogueError, DeriveOutcome, DeriveRequest, DerivedLinkPair, FitGroup, FitOutcome, FitPolynomial,
+    FitPreparation, FitRequest, FitTask, FitWithinGap, FittedKind, HierarchyMeasure, HierarchyOutcome,
+    HierarchyRequest, HierarchySet, Job, JobOutcome, JobState, JobTask, MAX_ENDED_JOBS, MAX_QUEUED_JOBS, NewJob,
+    RobotSource, StoreError,
 };
 
 fn request(name: &str) -> FitRequest {
@@ -258,6 +262,111 @@ fn solves_are_kept_in_every_state_and_known_by_their_content() {
         unexpected => panic!("{unexpected:?}"),
     }
     assert!(!again.create_job(asked()).expect("known").1);
+}
+
+/// A search through the pairs of links of a robot, with numbers that use all their bits.
+fn search(robot: RobotId) -> DeriveRequest {
+    DeriveRequest { robot, margin_m: 0.1 + 0.2, max_boxes: 7, resolution_m: 1e-3 }
+}
+
+/// A pair of each class.
+fn pairs() -> DeriveOutcome {
+    let classes = [PairClass::Adjacent, PairClass::Never, PairClass::Always, PairClass::Collides, PairClass::Undecided];
+    let pair = |class| DerivedLinkPair {
+        links: ["base".into(), "tool".into()],
+        class,
+        witness: (class != PairClass::Never).then(|| vec![0.1, -0.0]),
+        upper_m: (class != PairClass::Always).then_some(-0.25),
+        is_certain: class == PairClass::Collides,
+        boxes: 17,
+        srdf_reason: (class == PairClass::Collides).then(|| "Never".to_owned()),
+    };
+    DeriveOutcome { pairs: classes.map(pair).into(), seconds: 0.25 }
+}
+
+/// As solves: about a robot.
+#[test]
+fn searches_through_pairs_are_kept_in_every_state_and_known_by_their_content() {
+    let disk = Disk::default();
+    let catalogue = disk.load().expect("a new catalogue");
+    let load = |radius: &str| {
+        let link = |name: &str| {
+            let sphere = format!("<geometry><sphere radius=\"{radius}\"/></geometry>");
+            format!("<link name=\"{name}\"><collision>{sphere}</collision></link>")
+        };
+        let joint = r#"<joint name="turn" type="continuous"><parent link="base"/><child link="tool"/></joint>"#;
+        let urdf = format!("<robot name=\"arm\">{}{}{joint}</robot>", link("base"), link("tool"));
+        let source = RobotSource { urdf, ..RobotSource::default() };
+        *catalogue.load_robot(source).expect("a robot").0.robot.id()
+    };
+    let [robot, wider] = ["0.5", "0.75"].map(load);
+    let asked = |request_id: &str| NewJob::derive(request_id.into(), search(robot));
+    let (made, created) = catalogue.create_job(asked("r")).expect("queued");
+    assert!(created && made.task == JobTask::Derive(search(robot)));
+    assert!(matches!(catalogue.job_mesh(made.id), Err(CatalogueError::NoJob(_))), "it has no points");
+    saved(&disk, &made);
+    let found = JobState::Succeeded(JobOutcome::Derive(pairs()));
+    for state in [JobState::Running, found, JobState::Failed("why".into()), JobState::Cancelled] {
+        let changed = catalogue.change_job(made.id, Vec::new(), |_| Some((state.clone(), 1))).expect("moved on");
+        assert_eq!((&changed.state, changed.attempts), (&state, 1));
+        saved(&disk, &changed);
+    }
+    drop(catalogue);
+    let again = disk.load().expect("loads");
+    assert!(!again.create_job(asked("r")).expect("known").1);
+    let same = search(robot);
+    for other in [
+        DeriveRequest { robot: wider, ..same },
+        DeriveRequest { margin_m: 0.3, ..same },
+        DeriveRequest { max_boxes: 8, ..same },
+        DeriveRequest { resolution_m: 2e-3, ..same },
+    ] {
+        let used = again.create_job(NewJob::derive("r".into(), other)).expect_err("another content");
+        assert!(matches!(used, CatalogueError::RequestUsed { job: 1, .. }), "{used}");
+    }
+    // Of a robot that is gone there is no further search, and the one that there was stays.
+    again.delete_robot(&robot).expect("deleted");
+    match again.create_job(asked("")) {
+        Err(CatalogueError::NoRobot(id)) => assert_eq!(id, robot),
+        unexpected => panic!("{unexpected:?}"),
+    }
+    assert!(!again.create_job(asked("r")).expect("known").1);
+    drop(again);
+    let again = disk.load().expect("loads");
+    assert_eq!(again.job(made.id).expect("there").task, JobTask::Derive(same), "though its robot is gone");
+}
+
+/// A search as it is written, the robot only named in it.
+#[test]
+fn the_row_of_a_search_through_pairs_has_one_form() {
+    let robot = "a7".repeat(32);
+    let task = format!(
+        r#"{{"derive":{{"robot":"{robot}","margin_m":0.30000000000000004,"max_boxes":7,"resolution_m":0.001}}}}"#
+    );
+    let new = NewJob::derive("r".into(), search(robot.parse().expect("an id")));
+    assert_eq!(serde_json::to_string(&new.task).expect("JSON"), task);
+    let digest: String = Sha256::digest(&task).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_eq!(new.digest, digest, "what request ids are compared by");
+    let pair = |class: &str, seen: &str, certain: bool, reason: &str| {
+        format!(r#"{{"links":["base","tool"],"class":"{class}",{seen}"is_certain":{certain},"boxes":17{reason}}}"#)
+    };
+    let (witness, upper) = (r#""witness":[0.1,-0.0],"#, r#""upper_m":-0.25,"#);
+    let both = format!("{witness}{upper}");
+    let written = [
+        pair("adjacent", &both, false, ""),
+        pair("never", upper, false, ""),
+        pair("always", witness, false, ""),
+        pair("collides", &both, true, r#","srdf_reason":"Never""#),
+        pair("undecided", &both, false, ""),
+    ];
+    let state = format!(r#"{{"succeeded":{{"derive":{{"pairs":[{}],"seconds":0.25}}}}}}"#, written.join(","));
+    let row = format!(r#"{{"id":1,"request_id":"r","digest":"{digest}","task":{task},"attempts":1,"state":{state}}}"#);
+    let disk = Disk::default();
+    drop(disk.load().expect("a new catalogue"));
+    write_job(&disk, &row);
+    let (known, created) = disk.load().expect("loads").create_job(new).expect("known");
+    assert_eq!((created, &known.state), (false, &JobState::Succeeded(JobOutcome::Derive(pairs()))));
+    assert_eq!(serde_json::to_string(&*known).expect("JSON"), row, "nor is it written otherwise now");
 }
 
 #[test]

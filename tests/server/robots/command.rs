@@ -8,7 +8,7 @@ use sublevel::client::{CertificateQuestion, MotionsQuestion};
 use sublevel::scene::query::StateVerdict;
 use sublevel::store::RobotSource;
 
-use super::{CUBE, SRDF, URDF, cell, served};
+use super::{CUBE, ODD, ODD_SRDF, SRDF, URDF, cell, served};
 use crate::harness::{Running, run};
 
 /// The crane with its files in a folder of its own.
@@ -154,6 +154,31 @@ fn packages_are_found_where_they_are_said_to_be() {
         assert_eq!(row(&found, "hand")["body"], row(&expected, "hand")["body"]);
         assert_eq!(row(&found, "hand")["source"], "kept");
     }
+}
+
+#[test]
+fn what_is_odd_in_an_srdf_is_noted() {
+    let files = Files::new();
+    files.write("odd.srdf", ODD_SRDF);
+    let (urdf, out) = (files.path("crane.urdf"), files.path("new/links"));
+    let robot = |srdf: &str, more: &[&str]| {
+        let done = run(&[&["robot", &urdf, "--srdf", srdf, "--out", &out, "--degree", "2"], more].concat());
+        let [written, said] = [done.stdout, done.stderr].map(|bytes| String::from_utf8(bytes).expect("text"));
+        assert!(done.status.success(), "{said}");
+        (written, said)
+    };
+    let odd = files.path("odd.srdf");
+    let notes: String = ODD.iter().map(|warning| format!("note: {odd}: {warning}\n")).collect();
+    let (report, said) = robot(&odd, &["--json"]);
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    assert_eq!((&report["warnings"], said), (&serde_json::json!(ODD), notes.clone()));
+    // The table comes without them, on its own stream.
+    let (table, said) = robot(&odd, &[]);
+    assert!(table.contains("4 links with geometry") && !table.contains("note"), "{table}");
+    assert_eq!(said, notes);
+    let (report, said) = robot(&files.path("crane.srdf"), &["--json"]);
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    assert_eq!((&report["warnings"], said.as_str()), (&serde_json::json!([]), ""));
 }
 
 #[test]
@@ -323,7 +348,7 @@ async fn certificates_of_motions_are_verified() {
         assert_eq!((&report["free_proven"], &report["clearance_lower_m"]), (&false.into(), &Value::Null));
         assert_eq!(verified(dir.path(), text, &[]).1, "", "nothing is claimed");
     };
-    let format = "sublevel motion certificate 1";
+    let format = "sublevel motion certificate 2";
     let [claim, path, records] = parts(&text);
     let changed = |part: &str, from: &str, to: &str| {
         assert!(part.contains(from), "{part}");
@@ -334,7 +359,7 @@ async fn certificates_of_motions_are_verified() {
     is_refused(&text[..text.len() - 2], "no motion certificate: EOF");
     is_refused(&text[..text.len() / 2], "no motion certificate: EOF");
     is_refused(&text.replacen("\"path\"", "path", 1), "no motion certificate");
-    is_refused(&text.replacen("certificate 1", "certificate 2", 1), "format");
+    is_refused(&text.replacen("certificate 2", "certificate 1", 1), "format");
     // With a digest that fits, by somebody who knows how: now the proof itself has to hold.
     assert_eq!(signed(format, [claim, path, records]), text);
     let last = records.rfind(",{\"interval\":").expect("records");

@@ -4,9 +4,10 @@ use sublevel::scene::Update;
 use sublevel::service::proto::{
     DeleteSceneRequest, GetRobotRequest, GetSceneResponse, WatchSceneRequest, WatchSceneResponse,
 };
+use sublevel::store::RobotSource;
 use tonic::Code;
 
-use super::{SRDF, URDF, at, cell, joints, served, source};
+use super::{ODD, ODD_SRDF, SRDF, URDF, at, cell, joints, served, source};
 use crate::harness::Running;
 
 #[tokio::test(flavor = "multi_thread")]
@@ -38,6 +39,25 @@ async fn a_robot_is_loaded_once_and_described() {
     client.delete_robot(&robot.id).await.expect("deleted");
     client.delete_body(&arm).await.expect("free now");
     assert_eq!(client.robot(&robot.id).await.expect_err("gone").code(), Some(Code::NotFound));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_odd_in_an_srdf_is_said_whenever_the_robot_is_asked_for() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (server, client, mut clients, robot) = served(dir.path()).await;
+    assert_eq!(robot.warnings, [""; 0]);
+    let hand = robot.links[3].body.expect("a body").to_string();
+    let odd = client.load_robot(&RobotSource { srdf: ODD_SRDF.into(), ..source(&hand) }).await.expect("loaded");
+    assert_eq!(odd.warnings, ODD);
+    let request = GetRobotRequest { id: odd.id.to_string() };
+    let found = clients.robots.get_robot(request).await.expect("there").into_inner();
+    assert_eq!(found.robot.expect("a robot").warnings, ODD);
+    assert_eq!(found.srdf, ODD_SRDF);
+    server.kill();
+    let server = Running::start(dir.path());
+    let client = server.client().await;
+    assert_eq!(client.robot(&odd.id).await.expect("there").warnings, ODD);
+    assert_eq!(client.robot(&robot.id).await.expect("there").warnings, [""; 0]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -1,8 +1,10 @@
 //! Links whose meshes are sent along, and robots of many kinds.
 
-use sublevel::client::{CertificateQuestion, ClearanceQuestion, MotionsQuestion, RobotPlacement, StatesQuestion};
+use sublevel::client::{
+    CertificateQuestion, ClearanceQuestion, MotionsQuestion, Question, RobotPlacement, StatesQuestion,
+};
 use sublevel::scene::NamedJointValues;
-use sublevel::scene::query::StateVerdict;
+use sublevel::scene::query::{Measure, StateVerdict};
 use sublevel::service::proto::fit_mesh::Content;
 use sublevel::service::proto::{FitMesh, LinkMesh, LoadRobotRequest, MeshFormat};
 
@@ -39,6 +41,55 @@ async fn a_link_is_fitted_within_its_gap_and_to_the_same_body_again() {
     let finer = client.load_robot_with(finer).await.expect("loaded");
     let hand = finer.links.iter().find(|link| &*link.name == "hand").expect("a hand");
     assert!(hand.gap_m.expect("a gap") <= 0.5 * gap && hand.body != Some(body) && finer.id != first.id);
+}
+
+/// A wedge as OFF: a right-angled triangle with legs of 0.4 m along x and y, 0.1 m high.
+const WEDGE: &str = "OFF\n6 8 0\n0 0 0\n0.4 0 0\n0 0.4 0\n0 0 0.1\n0.4 0 0.1\n0 0.4 0.1\n\
+3 0 2 1\n3 3 4 5\n3 0 1 4\n3 0 4 3\n3 0 3 5\n3 0 5 2\n3 1 2 5\n3 1 5 4\n";
+
+/// The wedge mirrored, three times as high, turned by a right angle and 1 m away.
+const MIRRORED: &str = r#"<robot name="mirrored">
+  <link name="base"/>
+  <link name="wedge"><collision><origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>
+    <geometry><mesh filename="wedge.off" scale="1 -1 3"/></geometry></collision></link>
+  <joint name="turn" type="continuous"><parent link="base"/><child link="wedge"/><axis xyz="0 0 1"/></joint>
+</robot>"#;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn mirrored_and_scaled_meshes_are_where_they_should_be() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, _) = served(dir.path()).await;
+    let meshes = vec![mesh("wedge.off", MeshFormat::Off, WEDGE)];
+    let robot = client.load_robot_with(load(MIRRORED, "", meshes)).await.expect("loaded");
+    let gap = robot.links[1].gap_m.expect("a gap");
+    assert!((0.0..=0.02).contains(&gap), "{gap}");
+    client.create_scene("room").await.expect("made");
+    client.place_robot("room", &RobotPlacement::new("robot", &robot)).await.expect("placed");
+    let ball = client.create_ball("ball", 0.05).await.expect("a ball");
+    // The triangle of the mesh has its corners at (0, 0), (0.4, 0) and (0, -0.4) once it is
+    // mirrored, and z from 0 to 0.3; a quarter turn takes (x, y) to (-y, x). Places of the centre
+    // in the frame of the mesh, with the distance of the ball from the hull.
+    let (beyond_the_corner, above) = ([0.0, -0.7, 0.15], [0.1, -0.1, 0.6]);
+    let (within, where_the_mesh_would_be_unmirrored) = ([0.1, -0.1, 0.15], [0.1, 0.1, 0.15]);
+    for ([x, y, z], expected_m) in [
+        (beyond_the_corner, 0.3 - 0.05),
+        (above, 0.3 - 0.05),
+        (within, 0.0),
+        (where_the_mesh_would_be_unmirrored, 0.1 - 0.05),
+    ] {
+        let place = at(1.0 - y, x, z);
+        client.put_objects("room", [("ball", &ball, place)]).await.expect("placed");
+        let ask = Question::pairs([("robot/wedge", "ball")]);
+        let found = client.evaluate("room", ask, &[Measure::Distance]).await.expect("answered");
+        let distance_m = found.rows[0].value.expect("a distance");
+        // The body lies around the mesh, and reaches beyond it by its gap.
+        let is_right = distance_m <= expected_m + 1e-6 && distance_m >= expected_m - gap - 1e-6;
+        assert!(is_right, "{x}, {y}, {z}: {distance_m}, {expected_m} {gap}");
+        let ask = StatesQuestion::new(["ball"]).with_states(&[place]);
+        let found = client.check_states("room", ask).await.expect("answered");
+        let expected = if expected_m == 0.0 { StateVerdict::Contact } else { StateVerdict::Free };
+        assert_eq!(found.verdicts, [expected], "{x}, {y}, {z}");
+    }
 }
 
 /// A cube with edges of 1 unit of 0.1 m, as COLLADA.

@@ -3,7 +3,11 @@
 mod clearances;
 #[cfg(feature = "fit")]
 mod command;
+#[cfg(feature = "fit")]
+mod derived_jobs;
 mod explained;
+#[cfg(feature = "fit")]
+mod files;
 mod kept;
 mod meshes;
 mod motions;
@@ -48,6 +52,21 @@ const SRDF: &str = r#"<robot name="crane">
   <group name="all"><chain base_link="post" tip_link="finger"/></group>
   <disable_collisions link1="post" link2="hand" reason="Never"/>
 </robot>"#;
+
+/// An SRDF of the same robot with what is odd and does not prevent its use.
+const ODD_SRDF: &str = r#"<robot name="crane">
+  <group name="empty"/>
+  <disable_collisions link1="post" link2="hand" reason="Never"/>
+  <disable_collisions link1="hand" link2="post"/>
+  <something/>
+</robot>"#;
+
+/// What is said of it, in the order of its lines.
+const ODD: [&str; 3] = [
+    "line 2, column 3, robot/group[empty]: the group is empty",
+    "line 4, column 3, robot/disable_collisions[2]: the pair \"post\", \"hand\" is disabled more than once",
+    "line 5, column 3, robot/something: the element \"something\" is not read",
+];
 
 /// A cube with edges of 0.1 m, as OFF.
 pub(crate) const CUBE: &str = "OFF\n8 12 0\n0 0 0\n0.1 0 0\n0.1 0.1 0\n0 0.1 0\n0 0 0.1\n0.1 0 0.1\n0.1 0.1 0.1\n0 0.1 0.1\n\
