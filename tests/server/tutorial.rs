@@ -1,6 +1,8 @@
 //! The planner of the tutorial, `docs/planning.md`: what the page shows is what the example does,
 //! and it plans.
 
+mod picture;
+
 use std::path::Path;
 use std::process::{Command, Stdio};
 
