@@ -237,6 +237,10 @@ fn the_quick_chart_of_the_panda_keeps_what_is_free() {
     let kept = |name: &str| of(states, name, "kept")[0] / of(states, name, "known")[0];
     assert!(kept("ellipsoids") < kept("degree 4") && kept("degree 6") > 0.95, "{csv}");
     assert_eq!(of(states, "ladder 2-4-6", "kept"), of(states, "degree 6", "kept"));
+    // By poses of the links as well as by joint values, of each representation and family.
+    let given = column(states, "", "given_us");
+    assert!(given.len() > 9 && given.iter().skip(1).all(|us| *us > 0.0), "{states}");
+    assert!(report.contains("| poses given µs | of coal |"), "the table of states shows them");
     let gaps = column(links, "\"within 2 cm, as by default\",", "gap_m");
     assert!(gaps.len() == 11 && gaps.iter().all(|gap| (0.0..=0.02).contains(gap)), "{links}");
     for name in ["degree 4", "degree 6", "two parts of degree 6 refined", "within 2 cm, as by default"] {
@@ -291,10 +295,21 @@ fn the_panda_takes_other_problems_and_prints_json() {
     }
     let states = found["states"].as_array().expect("rows");
     assert!(states.iter().all(|row| row["known"] == 4 && row["contacts"].is_null()), "coal took no part");
+    assert!(states.iter().all(|row| row["given_us"].as_f64().is_some_and(|us| us > 0.0)), "{states:?}");
     let summary = found["summary"].as_array().expect("figures");
     let is_of_coal = |figure: &&serde_json::Value| figure["what"].as_str().is_some_and(|what| what.contains("of coal"));
     assert!(summary.iter().filter(is_of_coal).all(|figure| figure["value"].is_null()), "{summary:?}");
     assert!(summary.iter().filter(|figure| figure["value"].is_number()).count() > 10, "{summary:?}");
+    // The default is measured as degree 6 is.
+    for what in
+        ["the same with self-collision, of the one before", "CheckStates over gRPC in batches of 1 000, of in process"]
+    {
+        for suffix in ["", ", links within 2 cm, as by default"] {
+            let name = format!("{what}{suffix}");
+            let found: Vec<_> = summary.iter().filter(|figure| figure["what"] == name.as_str()).collect();
+            assert!(found.len() == 1 && found[0]["value"].is_number(), "{name}: {summary:?}");
+        }
+    }
     assert!(found["links"].as_array().expect("rows").len() > 80 && found["machine"]["cores"].is_number());
     let meshes = found["meshes"].as_array().expect("rows");
     assert_eq!(meshes.len(), 9, "{meshes:?}");

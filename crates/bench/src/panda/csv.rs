@@ -7,7 +7,7 @@ use crate::csv::{CsvError, Row, Table};
 
 /// Columns of the table of states.
 const STATES: &str = "family,representation,pieces,known,kept,kept_self,random,random_free,contacts,cold_us,scene_us,\
-                      self_us,distances_us,call_us,inside_us";
+                      given_us,self_us,distances_us,call_us,inside_us";
 /// Columns of the table of motions.
 const MOTIONS: &str = "family,representation,from,length_rad,problems,free,mean_us,median_us,p99_us,configurations,\
                        sampled_us,coal_us,certified_us,verify_us,verify_part,samples,contacts,coal_samples,coal_contacts";
@@ -32,7 +32,8 @@ pub(super) fn written(Tables { states, motions, links, meshes, srdf }: &Tables) 
             "{family},\"{representation}\",{pieces},{known},{kept},{kept_self},{random},{random_free},{}",
             maybe(row.contacts)
         );
-        for time in [row.cold_us, row.scene_us, row.self_us, row.distances_us, row.call_us, row.inside_us] {
+        let times = [row.cold_us, row.scene_us, row.given_us, row.self_us, row.distances_us];
+        for time in times.into_iter().chain([row.call_us, row.inside_us]) {
             let _ = write!(text, ",{}", number(time));
         }
         text.push('\n');
@@ -74,7 +75,8 @@ pub(super) fn written(Tables { states, motions, links, meshes, srdf }: &Tables) 
     text
 }
 
-/// Reads what [`written`] wrote; the tables after that of motions may be missing.
+/// Reads what [`written`] wrote; the tables after that of motions may be missing, and so may the
+/// column `given_us` of states.
 pub(super) fn read(csv: &str) -> Result<Tables, CsvError> {
     let mut parts = csv.split("\n\n");
     let mut table = || Table::read(parts.next().unwrap_or_default());
@@ -139,6 +141,8 @@ fn state(row: Row<'_>) -> Result<StateRow, CsvError> {
         contacts: row.maybe("contacts")?,
         cold_us: row.number("cold_us")?,
         scene_us: row.number("scene_us")?,
+        // Earlier runs did not have it.
+        given_us: row.text("given_us").map_or(Ok(f64::NAN), |_| row.number("given_us"))?,
         self_us: row.number("self_us")?,
         distances_us: row.number("distances_us")?,
         call_us: row.number("call_us")?,
@@ -197,6 +201,7 @@ mod tests {
             contacts: None,
             cold_us: 2.5,
             scene_us: 1.25,
+            given_us: 0.75,
             self_us: 3.0,
             distances_us: 100.0,
             call_us: 4.0,
@@ -254,6 +259,13 @@ mod tests {
         let all = Tables { states, motions, links, meshes: vec![mesh], srdf: vec![srdf] };
         let text = written(&all);
         assert_eq!(read(&text), Ok(all.clone()));
+        // Earlier runs did not measure states at given poses.
+        let without = text.replace("scene_us,given_us,", "scene_us,").replace(",1.2500,0.7500,", ",1.2500,");
+        let mut earlier = read(&without).expect("a CSV without the column");
+        assert!(earlier.states[0].given_us.is_nan());
+        earlier.states[0].given_us = 0.75;
+        assert_eq!(earlier, all);
+        assert!(read(&text.replace(",0.7500,", ",fast,")).is_err());
         // Earlier runs wrote fewer tables.
         let tables: Vec<&str> = text.split("\n\n").collect();
         let before = |count: usize| read(&tables[..count].join("\n\n"));

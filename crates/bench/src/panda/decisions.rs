@@ -4,12 +4,13 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
+use nalgebra::Isometry3;
 use sublevel::scene::query::{Clearance, JointValues, StateVerdict, States};
-use sublevel::scene::{Question, Scene, Stop};
+use sublevel::scene::{Question, Scene, Slot, Stop};
 
 use super::arm::Arm;
 use super::coal::{CoalPanda, CoalStates, CoalTimes};
-use super::place::{ARM, Site};
+use super::place::{ARM, BASE_LINK, Site};
 use super::problems::Problem;
 use super::representation::{LoadedArm, Representation};
 use super::rows::{COAL, StateRow};
@@ -33,8 +34,63 @@ struct Entry<'a> {
     arm: &'a LoadedArm,
     /// Without and with self-collision.
     scenes: Vec<[Scene; 2]>,
+    /// The timed states of each problem as poses.
+    given: Vec<LinkPoses>,
     /// Microseconds per state, round by round.
-    times: [Vec<f64>; 4],
+    times: [Vec<f64>; 5],
+}
+
+/// States as world poses of the links that move, the base at the origin.
+struct LinkPoses {
+    /// Objects of the links.
+    slots: Vec<Slot>,
+    /// Translations, metres, and quaternions x y z w, packed.
+    numbers: Vec<f64>,
+}
+
+impl LinkPoses {
+    /// Those of packed joint values, radians.
+    fn new(scene: &Scene, states: &[f64]) -> Result<Self, Box<dyn Error>> {
+        let instance = scene.robot(ARM).ok_or("a scene without the arm")?;
+        let base = scene.slot(&format!("{ARM}/{BASE_LINK}"));
+        let objects = instance.link_slots().iter().enumerate();
+        let moving: Vec<(usize, Slot)> =
+            objects.filter_map(|(link, &slot)| Some((link, slot?))).filter(|(_, slot)| Some(*slot) != base).collect();
+        let kinematics = instance.robot().kinematics();
+        let (mut frames, mut numbers) = (Vec::new(), Vec::new());
+        for state in states.chunks_exact(kinematics.width()) {
+            kinematics.forward(&Isometry3::identity(), state, &mut frames);
+            for (link, _) in &moving {
+                let (translation, rotation) = (frames[*link].translation.vector, frames[*link].rotation.coords);
+                numbers.extend(translation.iter());
+                // As the library places links.
+                numbers.extend((rotation / rotation.norm()).iter());
+            }
+        }
+        Ok(Self { slots: moving.into_iter().map(|(_, slot)| slot).collect(), numbers })
+    }
+
+    /// The question about these states, whose poses are `numbers`.
+    fn question(&self, scene: &Scene, numbers: Vec<f64>) -> Result<States, Box<dyn Error>> {
+        Ok(States::new(scene.clone(), &self.slots, numbers, 0.0, false)?)
+    }
+
+    /// Compares with what is proven of the same states as joint values.
+    ///
+    /// # Errors
+    /// A state that is free one way and in contact the other.
+    fn compare(&self, scene: &Scene, states: &[f64]) -> Result<(), Box<dyn Error>> {
+        let by_joints = alone(&question(scene, states)?).concat();
+        let by_poses = alone(&self.question(scene, self.numbers.clone())?).concat();
+        let differ =
+            |pair: [StateVerdict; 2]| pair.contains(&StateVerdict::Free) && pair.contains(&StateVerdict::Contact);
+        if by_joints.len() != by_poses.len()
+            || by_joints.iter().zip(&by_poses).any(|(a, b)| differ([a.verdict, b.verdict]))
+        {
+            return Err("states are decided otherwise by poses of links than by joint values".into());
+        }
+        Ok(())
+    }
 }
 
 /// How much is measured.
@@ -63,7 +119,9 @@ pub(super) fn measure(
     let mut entries = Vec::new();
     for (links, loaded) in arms {
         let scenes = sites.iter().map(|site| site.scenes(loaded)).collect::<Result<Vec<_>, _>>()?;
-        entries.push(Entry { links: *links, arm: loaded, scenes, times: Default::default() });
+        let of_task = |(task, scenes): (&Task<'_>, &[Scene; 2])| LinkPoses::new(&scenes[0], &task.states.timed);
+        let given = tasks.iter().zip(&scenes).map(of_task).collect::<Result<Vec<_>, _>>()?;
+        entries.push(Entry { links: *links, arm: loaded, scenes, given, times: Default::default() });
     }
     let reference = entries.iter().position(|entry| entry.links == Representation::Degree6).unwrap_or(0);
     for (index, task) in tasks.iter_mut().enumerate() {
@@ -112,8 +170,8 @@ pub(super) fn free(scene: &Scene, states: &[f64]) -> Result<Vec<bool>, Box<dyn E
 }
 
 impl Entry<'_> {
-    /// One turn: states with hints, without and with self-collision; in the first one also states
-    /// cold, and distances.
+    /// One turn: states with hints, by joint values without and with self-collision, and by poses;
+    /// in the first one also states cold, and distances.
     fn round(&mut self, tasks: &[Task<'_>], width: usize, is_first: bool) -> Result<(), Box<dyn Error>> {
         let count = |pick: fn(&ProblemStates) -> &[f64]| {
             (tasks.iter().map(|task| pick(&task.states).len()).sum::<usize>() / width) as f64
@@ -130,6 +188,12 @@ impl Entry<'_> {
             }
             self.times[place].push(1e6 * start.elapsed().as_secs_f64() / count(timed));
         }
+        let numbers: Vec<Vec<f64>> = self.given.iter().map(|given| given.numbers.clone()).collect();
+        let start = Instant::now();
+        for ((given, numbers), scenes) in self.given.iter().zip(numbers).zip(&self.scenes) {
+            std::hint::black_box(alone(&given.question(&scenes[0], numbers)?));
+        }
+        self.times[4].push(1e6 * start.elapsed().as_secs_f64() / count(timed));
         if !is_first {
             return Ok(());
         }
@@ -155,15 +219,17 @@ impl Entry<'_> {
         (coal, folder): (Option<&CoalPanda>, &Path),
     ) -> Result<StateRow, Box<dyn Error>> {
         let (width, mut kept, mut random_free) = (arm.kinematics.width(), [0, 0], Vec::new());
-        for (task, scenes) in tasks.iter().zip(&self.scenes) {
+        for ((task, scenes), given) in tasks.iter().zip(&self.scenes).zip(&self.given) {
             for (kept, scene) in kept.iter_mut().zip(scenes) {
                 *kept += free(scene, &task.states.ends)?.into_iter().filter(|free| *free).count();
             }
+            given.compare(&scenes[0], &task.states.timed)?;
             let marks = free(&scenes[0], &task.states.random)?;
             random_free.push((task.problem, marked(&task.states.random, width, &marks)));
         }
         let proven: Vec<_> = random_free.iter().map(|(problem, states)| (*problem, &states[..])).collect();
-        let [cold_us, scene_us, self_us, distances_us] = [0, 1, 2, 3].map(|place| median(&self.times[place]));
+        let [cold_us, scene_us, self_us, distances_us, given_us] =
+            [0, 1, 2, 3, 4].map(|place| median(&self.times[place]));
         Ok(StateRow {
             family: tasks.first().map(|task| task.problem.family.clone()).unwrap_or_default(),
             representation: self.links.name().into(),
@@ -176,6 +242,7 @@ impl Entry<'_> {
             contacts: coal.map(|coal| coal.contacts(folder, arm, &proven)).transpose()?,
             cold_us,
             scene_us,
+            given_us,
             self_us,
             distances_us,
             call_us: f64::NAN,
@@ -214,6 +281,7 @@ fn coal_row(
         contacts: Some(contacts),
         cold_us: time(|run| run.collide_cold.us_per_state),
         scene_us: time(|run| run.collide_warm.us_per_state),
+        given_us: time(|run| run.collide_warm.us_per_state),
         self_us: f64::NAN,
         distances_us: distances,
         call_us: f64::NAN,

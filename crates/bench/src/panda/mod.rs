@@ -108,8 +108,8 @@ pub fn panda(
     for (links, loaded) in arms.iter().filter(|(links, _)| links.has_motions()) {
         for own in &sites {
             announce(&format!("motions: {}, {}", links.name(), own[0].problem.family))?;
-            // Coal takes the edges of one representation.
-            let beside = if *links == Representation::Degree6 { beside } else { (None, folder.path()) };
+            // Coal takes the edges of the representations that the summary is about.
+            let beside = if summary::SUBJECTS.contains(links) { beside } else { (None, folder.path()) };
             measured.push(motions::measure(&arm, (*links, loaded), own, beside, (extent.samples, &crew))?);
         }
     }

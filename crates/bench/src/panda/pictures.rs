@@ -65,7 +65,8 @@ pub(super) fn chart_of_motions(states: &[StateRow], motions: &[MotionRow]) -> Re
         };
         Group { label: label.into(), ink, marker, points: rows().map(point).collect(), joined: false }
     };
-    let of_coal = rows().filter(|row| row.coal_us.is_finite());
+    // One cross: the first representation whose edges coal takes.
+    let of_coal = rows().find(|row| row.coal_us.is_finite()).into_iter();
     let of_coal = of_coal.map(|row| Point { x: row.coal_us / row.length_rad, y: share(COAL), label: COAL.into() });
     let groups = vec![
         group("proven", Ink::Blue, Marker::Disc, true, |row| row.mean_us),

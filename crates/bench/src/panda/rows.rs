@@ -94,6 +94,9 @@ pub(super) struct StateRow {
     pub(super) cold_us: f64,
     /// Among the obstacles, with hints.
     pub(super) scene_us: f64,
+    /// The same, with the poses of the links that move given instead of joint values; coal is
+    /// always given poses.
+    pub(super) given_us: f64,
     /// With self-collision and hints.
     pub(super) self_us: f64,
     /// Distances of all pairs of a moving link and an obstacle, in states that degree 6 proves
@@ -169,6 +172,7 @@ impl StateRow {
             contacts: rows.iter().map(|row| row.contacts).sum(),
             cold_us: mean(|row| row.cold_us),
             scene_us: mean(|row| row.scene_us),
+            given_us: mean(|row| row.given_us),
             self_us: mean(|row| row.self_us),
             distances_us: mean(|row| row.distances_us),
             call_us: mean(|row| row.call_us),

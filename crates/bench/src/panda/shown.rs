@@ -58,10 +58,13 @@ impl Shown {
     }
 
     fn table_of_states(&self) -> String {
-        let mut text = String::from(
+        // Earlier runs did not have it.
+        let has_given = self.states_of(ALL).any(|row| row.given_us.is_finite());
+        let [given_head, given_rule] = if has_given { [" poses given µs | of coal |", "---|---|"] } else { ["", ""] };
+        let mut text = format!(
             "| links as | convex pieces | known-free states kept | with self-collision | contacts missed | cold µs | µs | \
-             of coal | with self-collision µs | all distances µs | of coal | gRPC µs | in process µs |\n\
-             |---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+             of coal |{given_head} with self-collision µs | all distances µs | of coal | gRPC µs | in process µs |\n\
+             |---|---|---|---|---|---|---|---|---|---|---|---|---|{given_rule}\n",
         );
         let coal = self.states_of(ALL).find(|row| row.representation == COAL);
         let of_coal = |value: fn(&StateRow) -> f64, row: &StateRow| ratio(value(row) / coal.map_or(f64::NAN, value));
@@ -74,9 +77,14 @@ impl Shown {
                 }
                 _ => "-".into(),
             };
+            let given = if has_given {
+                format!(" {} | {} |", time(row.given_us), of_coal(|row| row.given_us, row))
+            } else {
+                String::new()
+            };
             let _ = writeln!(
                 text,
-                "| {} | {} | {} | {kept_self} | {missed} | {} | {} | {} | {} | {} | {} | {} | {} |",
+                "| {} | {} | {} | {kept_self} | {missed} | {} | {} | {} |{given} {} | {} | {} | {} | {} |",
                 row.representation,
                 row.pieces,
                 share(row.kept, row.known),
@@ -279,4 +287,38 @@ fn ratio(value: f64) -> String {
 
 fn checks(value: f64) -> String {
     if value.is_nan() { "-".into() } else { format!("{value:.1}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_at_given_poses_are_shown_where_they_were_measured() {
+        let heads = "family,representation,pieces,known,kept,kept_self,random,random_free,contacts,cold_us,scene_us";
+        let motions = "family,representation\n";
+        let table = |given: &str, ours: &str, coal: &str| {
+            let csv = format!(
+                "{heads},{given}self_us,distances_us,call_us,inside_us\n\
+                 all,\"degree 6\",11,200,199,198,300,280,0,2.5,2.0,{ours}3.0,50,4.0,3.5\n\
+                 all,\"hulls, coal\",11,200,200,0,300,279,21,10,8.0,{coal},100,,\n\n{motions}"
+            );
+            Shown::read(&csv).expect("a CSV").block("states").expect("a table")
+        };
+        let (with, without) = (table("given_us,", "1.6,", "8.0,"), table("", "", ""));
+        assert!(
+            with.contains("| cold µs | µs | of coal | poses given µs | of coal | with self-collision µs |"),
+            "{with}"
+        );
+        assert!(with.contains("| 2.50 | 2.00 | 0.25 | 1.60 | 0.20 | 3.00 | 50.0 | 0.50 |"), "{with}");
+        assert!(with.contains("| 10.0 | 8.00 | 1.00 | 8.00 | 1.00 | - | 100 | 1.00 |"), "{with}");
+        assert!(
+            !without.contains("given") && without.contains("| 2.50 | 2.00 | 0.25 | 3.00 | 50.0 | 0.50 |"),
+            "{without}"
+        );
+        for table in [with, without] {
+            let cells: Vec<usize> = table.lines().map(|line| line.matches('|').count()).collect();
+            assert!(cells.len() == 4 && cells.iter().all(|count| *count == cells[0]), "{table}");
+        }
+    }
 }

@@ -27,8 +27,12 @@ pub(super) enum Unit {
     Ratio,
 }
 
-/// The representation that most figures are about.
+/// The representation that the figures are about first.
 const MAIN: Representation = Representation::Degree6;
+
+/// The representations whose states and edges the figures are about: the main one, and what
+/// `sublevel robot` fits.
+pub(super) const SUBJECTS: [Representation; 2] = [MAIN, Representation::Default];
 
 impl Unit {
     /// A value as text.
@@ -43,30 +47,20 @@ impl Unit {
 }
 
 /// The figures over all families.
-pub(super) fn summary(Tables { states, motions, meshes, srdf, .. }: &Tables) -> Vec<Figure> {
-    let row = |name: &str| states.iter().find(|row| row.family == ALL && row.representation == name);
-    let of = |name: &str, value: fn(&StateRow) -> f64| row(name).map_or(f64::NAN, value);
-    let (main, coal) = (MAIN.name(), row(COAL));
-    let of_coal = |value: fn(&StateRow) -> f64| coal.map_or(f64::NAN, value);
-    let contacts = row(main).and_then(|row| row.contacts).map_or(f64::NAN, |contacts| contacts as f64);
-    let mut all = Vec::new();
-    let mut add = |what: String, value: f64, unit: Unit| {
-        all.push(Figure { what, value, unit });
-    };
+pub(super) fn summary(tables: &Tables) -> Vec<Figure> {
+    let Tables { states, motions, meshes, srdf, .. } = tables;
+    let (main, mut all) = (MAIN.name(), Vec::new());
+    let mut add = |what: String, value: f64, unit: Unit| all.push(Figure { what, value, unit });
     for links in [MAIN, Representation::Refined, Representation::Compound, Representation::AtMostTwo] {
-        let what = format!("known-free states kept, {}", links.name());
-        add(what, of(links.name(), StateRow::kept_share), Unit::Share);
+        let value = of_all(states, links.name()).map_or(f64::NAN, StateRow::kept_share);
+        add(format!("known-free states kept, {}", links.name()), value, Unit::Share);
     }
     // Earlier runs did not have it.
-    if let Some(default) = row(Representation::Default.name()) {
-        let name = Representation::Default.name();
-        add(format!("known-free states kept, links {name}"), default.kept_share(), Unit::Share);
-        add(
-            format!("state among obstacles, links {name}, of coal with cached guesses"),
-            default.scene_us / of_coal(|row| row.scene_us),
-            Unit::Ratio,
-        );
+    let default = of_all(states, Representation::Default.name());
+    if let Some(row) = default {
+        add(format!("known-free states kept, {}", subject(Representation::Default)), row.kept_share(), Unit::Share);
     }
+    let contacts = of_all(states, main).and_then(|row| row.contacts).map_or(f64::NAN, |contacts| contacts as f64);
     add(format!("states anywhere that {main} calls free and coal's hulls in contact"), contacts, Unit::Count);
     if let Some(row) = meshes.iter().find(|row| row.representation == main) {
         let what = format!("of {} states anywhere, those that {main} calls free and in which meshes meet", row.states);
@@ -77,74 +71,106 @@ pub(super) fn summary(Tables { states, motions, meshes, srdf, .. }: &Tables) -> 
         add(what, row.proven as f64, Unit::Count);
         add("time of all pairs, s".into(), row.seconds, Unit::Ratio);
     }
-    add(
-        format!("state among obstacles, {main}, kinematics included, of coal with cached guesses"),
-        of(main, |row| row.scene_us) / of_coal(|row| row.scene_us),
-        Unit::Ratio,
-    );
-    add(
-        "the same with self-collision, of the one before".into(),
-        of(main, |row| row.self_us / row.scene_us),
-        Unit::Ratio,
-    );
-    add(
-        format!("distances of all pairs of a state, {main}, of coal"),
-        of(main, |row| row.distances_us) / of_coal(|row| row.distances_us),
-        Unit::Ratio,
-    );
-    add(
-        "CheckStates over gRPC in batches of 1 000, of in process".into(),
-        of(main, |row| row.call_us / row.inside_us),
-        Unit::Ratio,
-    );
-    let state_us = of(main, |row| row.self_us);
-    let of_kind = |kind: usize| {
-        let is_kind = |row: &&MotionRow| {
-            let at = KINDS[kind];
-            row.family == ALL && row.representation == main && row.from == at.from() && row.length_rad == at.length_rad
-        };
-        motions.iter().find(is_kind)
-    };
-    let of_edge = |kind: usize, value: fn(&MotionRow) -> f64| of_kind(kind).map_or(f64::NAN, value);
-    let kinds = ["free edge of 0.5 rad from a goal", "free edge of 1 rad", "free edge of 5 rad"];
-    for (kind, what) in kinds.into_iter().enumerate() {
-        let units = [("in state checks", state_us), ("in checks of its samples", of_edge(kind, MotionRow::sample_us))];
-        for (words, unit_us) in units {
-            add(format!("{what}, median, {words}"), of_edge(kind, |row| row.median_us) / unit_us, Unit::Ratio);
-            add(format!("{what}, 99th percentile, {words}"), of_edge(kind, |row| row.p99_us) / unit_us, Unit::Ratio);
-        }
+    for links in SUBJECTS.into_iter().filter(|links| *links == MAIN || default.is_some()) {
+        add_states(tables, links, &mut add);
+        add_edges(tables, links, &mut add);
     }
-    let edge = "at 1 rad";
-    add(
-        format!("verification of a certificate, of the search that writes it, {edge}"),
-        of_edge(1, |row| row.verify_us / row.certified_us),
-        Unit::Ratio,
-    );
-    add(
-        format!("the same, of the search that writes none, median {edge}"),
-        of_edge(1, |row| row.verify_part),
-        Unit::Ratio,
-    );
-    add(
-        format!("proof, of our own checks of samples at 1/32 rad, {edge}"),
-        of_edge(1, |row| row.mean_us / row.sampled_us),
-        Unit::Ratio,
-    );
-    add(
-        format!("proof, of coal's checks of as many samples, {edge}"),
-        of_edge(1, |row| row.mean_us / row.coal_us),
-        Unit::Ratio,
-    );
     let all_rows = || motions.iter().filter(|row| row.family == ALL);
     let samples: usize = all_rows().map(|row| row.samples).sum();
     let contacts: usize = all_rows().map(|row| row.contacts).sum();
     add(format!("contacts among {samples} samples of edges that are proven free"), contacts as f64, Unit::Count);
-    let of_coal =
-        |value: fn(&MotionRow) -> Option<usize>| all_rows().filter_map(value).reduce(|sum, count| sum + count);
-    if let (Some(samples), Some(contacts)) = (of_coal(|row| row.coal_samples), of_coal(|row| row.coal_contacts)) {
-        add(format!("contacts of coal's hulls among {samples} of them, {main}"), contacts as f64, Unit::Count);
+    for links in SUBJECTS {
+        let rows = || all_rows().filter(|row| row.representation == links.name());
+        let of_coal =
+            |value: fn(&MotionRow) -> Option<usize>| rows().filter_map(value).reduce(|sum, count| sum + count);
+        if let (Some(samples), Some(contacts)) = (of_coal(|row| row.coal_samples), of_coal(|row| row.coal_contacts)) {
+            let what = format!("contacts of coal's hulls among {samples} of them, {}", subject(links));
+            add(what, contacts as f64, Unit::Count);
+        }
     }
     all
+}
+
+/// The row over all families of a representation.
+fn of_all<'a>(states: &'a [StateRow], name: &str) -> Option<&'a StateRow> {
+    states.iter().find(|row| row.family == ALL && row.representation == name)
+}
+
+/// A representation as figures name it.
+fn subject(links: Representation) -> String {
+    if links == Representation::Default { format!("links {}", links.name()) } else { links.name().into() }
+}
+
+/// What figures that do not name the main representation add for another one.
+fn suffix(links: Representation) -> String {
+    if links == MAIN { String::new() } else { format!(", {}", subject(links)) }
+}
+
+/// Figures of states of a representation.
+fn add_states(tables: &Tables, links: Representation, add: &mut impl FnMut(String, f64, Unit)) {
+    let (row, coal) = (of_all(&tables.states, links.name()), of_all(&tables.states, COAL));
+    let own = |value: fn(&StateRow) -> f64| row.map_or(f64::NAN, value);
+    let of_coal = |value: fn(&StateRow) -> f64| own(value) / coal.map_or(f64::NAN, value);
+    let (subject, suffix) = (subject(links), suffix(links));
+    // Earlier runs did not have it.
+    if own(|row| row.given_us).is_finite() {
+        add(
+            format!("state among obstacles, {subject}, poses of the links given, of coal with cached guesses"),
+            of_coal(|row| row.given_us),
+            Unit::Ratio,
+        );
+    }
+    add(
+        format!("state among obstacles, {subject}, kinematics included, of coal with cached guesses"),
+        of_coal(|row| row.scene_us),
+        Unit::Ratio,
+    );
+    add(
+        format!("the same with self-collision, of the one before{suffix}"),
+        own(|row| row.self_us / row.scene_us),
+        Unit::Ratio,
+    );
+    add(format!("distances of all pairs of a state, {subject}, of coal"), of_coal(|row| row.distances_us), Unit::Ratio);
+    add(
+        format!("CheckStates over gRPC in batches of 1 000, of in process{suffix}"),
+        own(|row| row.call_us / row.inside_us),
+        Unit::Ratio,
+    );
+}
+
+/// Figures of edges of a representation.
+fn add_edges(tables: &Tables, links: Representation, add: &mut impl FnMut(String, f64, Unit)) {
+    let state_us = of_all(&tables.states, links.name()).map_or(f64::NAN, |row| row.self_us);
+    let of_kind = |kind: usize| {
+        let is_kind = |row: &&MotionRow| {
+            let at = KINDS[kind];
+            let is_own = row.family == ALL && row.representation == links.name();
+            is_own && row.from == at.from() && row.length_rad == at.length_rad
+        };
+        tables.motions.iter().find(is_kind)
+    };
+    let of_edge = |kind: usize, value: fn(&MotionRow) -> f64| of_kind(kind).map_or(f64::NAN, value);
+    let suffix = suffix(links);
+    let kinds = ["free edge of 0.5 rad from a goal", "free edge of 1 rad", "free edge of 5 rad"];
+    for (kind, what) in kinds.into_iter().enumerate() {
+        let units = [("in state checks", state_us), ("in checks of its samples", of_edge(kind, MotionRow::sample_us))];
+        for (words, unit_us) in units {
+            let [median, p99] = [of_edge(kind, |row| row.median_us), of_edge(kind, |row| row.p99_us)];
+            add(format!("{what}, median, {words}{suffix}"), median / unit_us, Unit::Ratio);
+            add(format!("{what}, 99th percentile, {words}{suffix}"), p99 / unit_us, Unit::Ratio);
+        }
+    }
+    let at_a_radian: [(&str, fn(&MotionRow) -> f64); 4] = [
+        ("verification of a certificate, of the search that writes it, at 1 rad", |row| {
+            row.verify_us / row.certified_us
+        }),
+        ("the same, of the search that writes none, median at 1 rad", |row| row.verify_part),
+        ("proof, of our own checks of samples at 1/32 rad, at 1 rad", |row| row.mean_us / row.sampled_us),
+        ("proof, of coal's checks of as many samples, at 1 rad", |row| row.mean_us / row.coal_us),
+    ];
+    for (what, value) in at_a_radian {
+        add(format!("{what}{suffix}"), of_edge(1, value), Unit::Ratio);
+    }
 }
 
 #[cfg(test)]
@@ -156,6 +182,95 @@ mod tests {
         let figures = summary(&Tables::default());
         let unmeasured = figures.iter().filter(|figure| figure.unit.text(figure.value) == "not measured");
         assert!(unmeasured.count() > 10);
+        assert!(!figures.iter().any(|figure| figure.what.contains("given") || figure.what.contains("by default")));
         assert_eq!([Unit::Share.text(0.998), Unit::Count.text(3.0)], ["99.80 %", "3"]);
+    }
+
+    #[test]
+    fn the_default_is_beside_the_main_representation() {
+        let state = |representation: &str, us: f64| StateRow {
+            family: ALL.into(),
+            representation: representation.into(),
+            pieces: 11,
+            known: 4,
+            kept: 3,
+            kept_self: 3,
+            random: 0,
+            random_free: 0,
+            contacts: None,
+            cold_us: us,
+            scene_us: us,
+            given_us: 0.5 * us,
+            self_us: 3.0 * us,
+            distances_us: 10.0 * us,
+            call_us: 5.0,
+            inside_us: 4.0,
+        };
+        let default = Representation::Default.name();
+        let edge = MotionRow {
+            family: ALL.into(),
+            representation: default.into(),
+            from: KINDS[1].from().into(),
+            length_rad: KINDS[1].length_rad,
+            problems: 2,
+            free: 2,
+            mean_us: 50.0,
+            median_us: 48.0,
+            p99_us: 96.0,
+            configurations: 7.0,
+            sampled_us: 100.0,
+            coal_us: 200.0,
+            certified_us: 80.0,
+            verify_us: 20.0,
+            verify_part: 0.375,
+            samples: 2000,
+            contacts: 0,
+            coal_samples: Some(66),
+            coal_contacts: Some(1),
+        };
+        let mut tables = Tables {
+            states: vec![state(MAIN.name(), 2.0), state(default, 4.0), StateRow { given_us: 8.0, ..state(COAL, 8.0) }],
+            motions: vec![edge],
+            ..Tables::default()
+        };
+        let value = |figures: &[Figure], what: &str| {
+            let found: Vec<f64> = figures.iter().filter(|own| own.what == what).map(|own| own.value).collect();
+            assert_eq!(found.len(), 1, "{what}");
+            found[0]
+        };
+        let figures = summary(&tables);
+        for (links, of_coal) in [("degree 6", 0.25), ("links within 2 cm, as by default", 0.5)] {
+            let state = |how: &str| format!("state among obstacles, {links}, {how}, of coal with cached guesses");
+            assert_eq!(value(&figures, &state("poses of the links given")), 0.5 * of_coal);
+            assert_eq!(value(&figures, &state("kinematics included")), of_coal);
+            assert_eq!(value(&figures, &format!("distances of all pairs of a state, {links}, of coal")), of_coal);
+        }
+        for (what, expected) in [
+            ("known-free states kept", 0.75),
+            ("the same with self-collision, of the one before", 3.0),
+            ("CheckStates over gRPC in batches of 1 000, of in process", 1.25),
+            ("free edge of 1 rad, median, in state checks", 4.0),
+            ("free edge of 1 rad, 99th percentile, in state checks", 8.0),
+            ("verification of a certificate, of the search that writes it, at 1 rad", 0.25),
+            ("the same, of the search that writes none, median at 1 rad", 0.375),
+            ("proof, of our own checks of samples at 1/32 rad, at 1 rad", 0.5),
+            ("proof, of coal's checks of as many samples, at 1 rad", 0.25),
+            ("contacts of coal's hulls among 66 of them", 1.0),
+        ] {
+            assert_eq!(value(&figures, &format!("{what}, links {default}")), expected, "{what}");
+        }
+        // Of degree 6 no edges are there.
+        assert!(value(&figures, "free edge of 1 rad, median, in state checks").is_nan());
+
+        // As in a file of an earlier run.
+        tables.states.remove(1);
+        tables.states.iter_mut().for_each(|row| row.given_us = f64::NAN);
+        tables.motions.clear();
+        let figures = summary(&tables);
+        assert!(!figures.iter().any(|figure| figure.what.contains("given") || figure.what.contains("by default")));
+        assert_eq!(
+            value(&figures, "state among obstacles, degree 6, kinematics included, of coal with cached guesses"),
+            0.25
+        );
     }
 }
