@@ -7,6 +7,7 @@ use crate::measure::solver::stages::{Stage, except, only};
 use crate::measure::*;
 use crate::polynomial::{Exponents, HessianGram, HessianMonomial, Polynomial};
 use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
+use std::sync::OnceLock;
 use sublevel_testkit::Seeded;
 
 /// The constraint `(1 - ε) (a·z - b)² + ε |z|² <= 1`: a slab that bulges by so little that its
@@ -31,8 +32,14 @@ pub(in crate::measure) fn slab(a: &Vector3<f64>, b: f64) -> Constraint {
 }
 
 /// A body of degree 4 to 8 cut by up to six slabs across random directions, turned within its
-/// frame.
+/// frame: one of 200, as making bodies takes longer than measuring them.
 pub(in crate::measure) fn cut(random: &mut Seeded) -> Body {
+    static BODIES: [OnceLock<Body>; 200] = [const { OnceLock::new() }; 200];
+    let index = random.next() % 200;
+    BODIES[index as usize].get_or_init(|| new_cut(&mut Seeded(61_000 + index))).clone()
+}
+
+fn new_cut(random: &mut Seeded) -> Body {
     let degree = 4 + 2 * (random.next() % 3) as u8;
     let half = Vector3::from_fn(|_, _| 2_f64.powf(random.signed()));
     let round = Body::superellipsoid("cut", Vector3::zeros(), half, degree).unwrap();

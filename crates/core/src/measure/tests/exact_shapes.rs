@@ -7,10 +7,18 @@ use crate::body::Body;
 use crate::measure::solver::stages::{Stage, except, only};
 use crate::measure::*;
 use nalgebra::{UnitQuaternion, Vector3};
+use std::sync::OnceLock;
 use sublevel_testkit::Seeded;
 
-/// A box or a cylinder with sizes over two decades, in every other case turned within its frame.
+/// A box or a cylinder with sizes over two decades, in every other case turned within its frame:
+/// one of 200, as making bodies takes longer than measuring them.
 fn shape(random: &mut Seeded) -> Body {
+    static SHAPES: [OnceLock<Body>; 200] = [const { OnceLock::new() }; 200];
+    let index = random.next() % 200;
+    SHAPES[index as usize].get_or_init(|| new_shape(&mut Seeded(60_000 + index))).clone()
+}
+
+fn new_shape(random: &mut Seeded) -> Body {
     let mut size = || 10_f64.powf(random.signed() - 0.5);
     let (x, y, z) = (size(), size(), size());
     let body = if random.next().is_multiple_of(2) {

@@ -94,7 +94,17 @@ impl SupportProgram<'_> {
     /// rounding leaves none that is proven inside.
     fn point(&self, tolerance: f64) -> Option<SupportPoint> {
         let found = self.solve(tolerance, |_| false);
-        (found.lower > f64::NEG_INFINITY).then_some(found.point)
+        let is_found = found.lower > f64::NEG_INFINITY;
+        if is_found && found.upper - found.lower <= tolerance.max(FLOOR) {
+            return Some(found.point);
+        }
+        // On surfaces that are flat at all scales the search may end early, and what was known may
+        // be better.
+        let inside = |from: SupportPoint| self.body.move_inside(&from.x).map(|x| SupportPoint { x, ..from });
+        let known = [Some(self.start), self.other].into_iter().flatten().filter_map(inside);
+        let along = |point: &SupportPoint| self.direction.dot(&point.x);
+        let all = known.chain(is_found.then_some(found.point)).filter(|point| along(point).is_finite());
+        all.max_by(|p, q| along(p).total_cmp(&along(q)))
     }
 }
 
