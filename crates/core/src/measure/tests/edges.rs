@@ -59,7 +59,7 @@ fn new_cut(random: &mut Seeded) -> Body {
 fn cut_bodies_far_apart_converge() {
     for seed in 0..100 {
         let mut random = Seeded(75_000 + seed);
-        let large = cut(&mut random);
+        let large = new_cut(&mut random);
         let small = Body::superellipsoid("small", Vector3::zeros(), Vector3::repeat(0.02), 6).unwrap();
         let far = 100.0 + 300.0 * random.positive();
         let pose_a = random_pose(&mut random, 1.0);

@@ -323,7 +323,7 @@ fn smooth_bodies_over_shapes_are_settled_alone() {
     let (mut solved, count) = (0, 960);
     for seed in 0..count {
         let mut random = Seeded(76_000 + seed);
-        let (a, b) = (smooth[random.next() as usize % smooth.len()].clone(), shape(&mut random));
+        let (a, b) = (smooth[random.next() as usize % smooth.len()].clone(), new_shape(&mut random));
         let size = a.circumscribed().radius.min(b.circumscribed().radius);
         let pose_a = random_pose(&mut random, 1.0);
         let pose_b = at_gap(&a, &pose_a, &b, gaps[(seed % 8) as usize] * size, &mut random);
