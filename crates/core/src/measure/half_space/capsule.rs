@@ -15,8 +15,8 @@ use nalgebra::Vector3;
 /// rounding: all of its points are as near then.
 ///
 /// The bracket is that of rounding; the status says whether it is as narrow as `options` ask,
-/// relative to the largest of the capsule's reach, `r + h`, and 1e-3 of how far its place and the
-/// plane are from the origin.
+/// relative to the capsule's reach, `r + h`, or for a point to how far it or the plane is from the
+/// origin.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -39,12 +39,14 @@ pub fn distance_of_capsule_to_half_space(
     let slope = axis.dot(normal);
     let end = pose.translation() - if slope > 0.0 { axis } else { -axis };
     let height = normal.dot(&end) - offset - capsule.radius_m();
-    let size = pose.translation().norm() + capsule.reach_m() + offset.abs();
-    let slack = (ROTATION_ERROR + gamma(16)) * size;
+    let coordinates = pose.translation().norm() + capsule.reach_m() + offset.abs();
+    let slack = (ROTATION_ERROR + gamma(16)) * coordinates;
     let (lower, upper) = (height - slack, height + slack);
-    let large = capsule.reach_m().max(1e-3 * pose.translation().norm().max(offset.abs()));
+    let reach = capsule.reach_m();
+    // A point has no size of its own.
+    let size = if reach > 0.0 { reach } else { pose.translation().norm().max(offset.abs()) };
     HalfSpaceDistance {
-        status: Status::of(upper - lower <= options.accuracy() * large),
+        status: Status::of(upper - lower <= options.accuracy() * size),
         lower,
         upper,
         witness: end - normal * capsule.radius_m(),

@@ -93,7 +93,8 @@ impl Ask<'_> {
             }
             (start, spent) = (Some(SupportPoint { x: rough.point, active: rough.active }), rough.iterations);
         }
-        let found = height(body, &above.down, Asked::narrow(tolerance), start, &options.after(spent));
+        // The other half is left to roundings: of the surface, and of where the body stands.
+        let found = height(body, &above.down, Asked::narrow(0.5 * tolerance), start, &options.after(spent));
         *warm = Hint::Single { y: found.point, active: found.active }.into();
         answer(both(proven, above.bracket(&found)), &found.point, spent + found.iterations)
     }
