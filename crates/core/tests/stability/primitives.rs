@@ -70,6 +70,8 @@ fn decided(pair: &Pair, truth: &Reference, label: &str) {
     let is_met = matches!((&pair.a, &pair.b), (Shape::Body(_), Shape::Capsule(c)) if value <= -c.radius_m());
     // What thresholds may be within of the distance and undecided.
     let slack = pair.accuracy * pair.size() + pair.floor + 1e-12 * size + height;
+    // Where the axis lies on the surface but for rounding, a depth of it may be found as well.
+    let may_be_met = matches!((&pair.a, &pair.b), (Shape::Body(_), Shape::Capsule(c)) if value <= slack - c.radius_m());
     for offset in [None, Some(0.5), Some(-0.5), Some(1e-3), Some(-1e-3), Some(1e-6), Some(-1e-6)] {
         let threshold = offset.map(|offset| value.max(0.0) + offset * pair.size());
         if threshold.is_some_and(|threshold| threshold <= 0.0) {
@@ -101,7 +103,7 @@ fn decided(pair: &Pair, truth: &Reference, label: &str) {
                     assert!(truth.inside(&found), "{label}");
                 }
                 assert!(is_narrow || found.status != Status::Converged, "{label}");
-                assert!(pair.limit.is_some() || is_narrow || is_met || width <= slack, "{label}");
+                assert!(pair.limit.is_some() || is_narrow || may_be_met || width <= slack, "{label}");
             }
         }
     }
