@@ -5,12 +5,12 @@ use nalgebra::Vector3;
 use sublevel_core::body::{Body, Compound};
 use sublevel_core::measure::{
     Capsule, CapsuleDistance, Distance, HalfSpace, ImpactOptions, Motion, Options, Pose, Ray, Status, Sweep, WarmStart,
-    capsules_nearer_than, capsules_within_margin, cast_ball, cast_ray, distance, distance_batch,
-    distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_capsule_batch,
-    distance_to_half_space, distance_to_point, growth_distance, is_solved_in_lanes, level_distance, nearer_than,
-    nearer_to_capsule_than, nearer_to_half_space_than, overlap, overlap_of_capsules, overlap_with_capsule,
-    overlap_with_half_space, penetration, signed_distance, time_of_impact, translation_hessian, within_margin,
-    within_margin_of_capsule,
+    capsule_nearer_to_half_space_than, capsules_nearer_than, capsules_within_margin, cast_ball, cast_ray, distance,
+    distance_batch, distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule,
+    distance_to_capsule_batch, distance_to_half_space, distance_to_point, growth_distance, is_solved_in_lanes,
+    level_distance, nearer_than, nearer_to_capsule_than, nearer_to_half_space_than, overlap,
+    overlap_of_capsule_with_half_space, overlap_of_capsules, overlap_with_capsule, overlap_with_half_space,
+    penetration, signed_distance, time_of_impact, translation_hessian, within_margin, within_margin_of_capsule,
 };
 use sublevel_testkit::Seeded;
 use sublevel_testkit::bodies::{cut, cylinder};
@@ -245,6 +245,8 @@ fn no_kind_of_query_allocates() {
         });
         counted("capsule and half-space", &mut |_| {
             distance_of_capsule_to_half_space(&capsule, &pose_b, &plane, &options);
+            overlap_of_capsule_with_half_space(&capsule, &pose_b, &plane);
+            capsule_nearer_to_half_space_than(&capsule, &pose_b, &plane, 0.3).unwrap();
         });
         counted("pile and capsule", &mut |warm| {
             distance_to_capsule(&pile, &pose_a, &capsule, &pose_b, &options, warm);

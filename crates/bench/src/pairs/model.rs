@@ -8,7 +8,7 @@ use sublevel::fit::{FitOptions, ball};
 use sublevel::measure::{
     Capsule, CapsuleDistance, Decision, HalfSpace, HalfSpaceDistance, Options, Pose, Status, WarmStart, distance,
     distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_half_space, overlap,
-    overlap_of_capsules, overlap_with_capsule, overlap_with_half_space,
+    overlap_of_capsule_with_half_space, overlap_of_capsules, overlap_with_capsule, overlap_with_half_space,
 };
 
 use super::kind::Kind;
@@ -195,8 +195,7 @@ impl Model {
         }
     }
 
-    /// Whether both overlap, from nothing but the pose; of a capsule beside a half-space the sign
-    /// of the distance, which is a formula.
+    /// Whether both overlap, from nothing but the pose.
     #[inline]
     pub(super) fn overlap(&self, other: &Self, pose: &Pose) -> Answer {
         let (origin, options, warm) = (Pose::identity(), Options::default(), &mut WarmStart::default());
@@ -208,7 +207,11 @@ impl Model {
             (Form::Body(a), Form::HalfSpace(half_space, _)) => {
                 overlap_with_half_space(&**a, pose, half_space, &options, warm)
             }
-            (Form::Capsule(..), Form::HalfSpace(..)) | (Form::HalfSpace(..), _) => {
+            (Form::Capsule(a, _), Form::HalfSpace(half_space, _)) => {
+                overlap_of_capsule_with_half_space(a, pose, half_space)
+            }
+            // Never the first of a pair.
+            (Form::HalfSpace(..), _) => {
                 let found = self.distance(other, pose, warm);
                 return Found::decision(found.lower_m, found.upper_m);
             }

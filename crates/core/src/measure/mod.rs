@@ -49,8 +49,9 @@ pub use frames::pose::{Pose, PoseError};
 pub use frames::twist::Twist;
 pub use growth::{GrowthDistance, growth_distance};
 pub use half_space::{
-    HalfSpace, HalfSpaceDistance, HalfSpaceError, SignedThresholdError, distance_of_capsule_to_half_space,
-    distance_to_half_space, nearer_to_half_space_than, overlap_with_half_space,
+    HalfSpace, HalfSpaceDistance, HalfSpaceError, SignedThresholdError, capsule_nearer_to_half_space_than,
+    distance_of_capsule_to_half_space, distance_to_half_space, nearer_to_half_space_than,
+    overlap_of_capsule_with_half_space, overlap_with_half_space,
 };
 pub use level::{LevelDistance, level_distance};
 pub use options::{DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, MAX_ITERATIONS, Options, OptionsError};

@@ -7,9 +7,10 @@ use std::cell::Cell;
 use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use sublevel_core::measure::{
-    Decision, Options, Status, WarmStart, WithinMargin, capsules_nearer_than, capsules_within_margin, nearer_than,
-    nearer_to_capsule_than, nearer_to_half_space_than, overlap, overlap_of_capsules, overlap_with_capsule,
-    overlap_with_half_space, within_margin, within_margin_of_capsule,
+    Decision, Options, Status, WarmStart, WithinMargin, capsule_nearer_to_half_space_than, capsules_nearer_than,
+    capsules_within_margin, nearer_than, nearer_to_capsule_than, nearer_to_half_space_than, overlap,
+    overlap_of_capsule_with_half_space, overlap_of_capsules, overlap_with_capsule, overlap_with_half_space,
+    within_margin, within_margin_of_capsule,
 };
 use sublevel_testkit::catalogue::derivatives::GAPS;
 use sublevel_testkit::catalogue::limits::LIMITS;
@@ -57,8 +58,9 @@ fn cold(pair: &Pair, label: &str) -> (Solved, Reference) {
 /// so near to it that rounding hides it.
 fn decided(pair: &Pair, truth: &Reference, label: &str) {
     let value = truth.value();
-    // Bodies first, as the library takes them.
+    // Bodies first and half-spaces last, as the library takes them.
     let is_first = matches!(pair.a, Shape::Body(_)) || !matches!(pair.b, Shape::Body(_));
+    let is_first = is_first && !matches!(pair.a, Shape::HalfSpace);
     let pair = &if is_first { pair.clone() } else { pair.clone().swapped() };
     let (a, b) = (pair.pose_a.translation(), pair.pose_b.translation());
     let size = pair.sum() + (a - b).norm();
@@ -110,7 +112,7 @@ fn decided(pair: &Pair, truth: &Reference, label: &str) {
 }
 
 /// Whether the distance of a pair is below a threshold, metres, or whether the two overlap; none of
-/// points, and of capsules beside half-spaces, of which there are distances only.
+/// points, of which there are distances only.
 fn decide(pair: &Pair, threshold: Option<f64>) -> Option<Decision> {
     let (options, warm) = (&pair.options(), &mut WarmStart::default());
     let (pose_a, pose_b) = (&pair.pose_a, &pair.pose_b);
@@ -126,6 +128,12 @@ fn decide(pair: &Pair, threshold: Option<f64>) -> Option<Decision> {
         }
         (Shape::Body(a), Shape::HalfSpace, Some(t)) => {
             Ok(nearer_to_half_space_than(&**a, pose_a, &Shape::half_space(pose_b), t, options, warm).expect("finite"))
+        }
+        (Shape::Capsule(a), Shape::HalfSpace, None) => {
+            Ok(overlap_of_capsule_with_half_space(a, pose_a, &Shape::half_space(pose_b)))
+        }
+        (Shape::Capsule(a), Shape::HalfSpace, Some(t)) => {
+            Ok(capsule_nearer_to_half_space_than(a, pose_a, &Shape::half_space(pose_b), t).expect("finite"))
         }
         (Shape::Capsule(a), Shape::Capsule(b), None) => Ok(overlap_of_capsules(a, pose_a, b, pose_b)),
         (Shape::Capsule(a), Shape::Capsule(b), Some(t)) => capsules_nearer_than(a, pose_a, b, pose_b, t),

@@ -11,7 +11,7 @@ use sublevel_core::measure::{
 
 use super::answer::Verdict;
 use super::ask::Measure;
-use super::solver::{Pair, Solver};
+use super::solver::{Pair, Solver, capsule_above_half_space};
 use super::thing::{PairSlots, Thing};
 
 /// A decision with what is known of the signed distance, metres.
@@ -91,6 +91,10 @@ pub(crate) fn decide(solver: &Solver<'_>, pair: &Pair<'_>, threshold: f64, optio
         {
             let place = Pose::identity().with_translation(*point);
             capsules((capsule, pose), (&Capsule::POINT, &place), threshold)
+        }
+        (Thing::Capsule { capsule, pose }, Thing::HalfSpace(half_space))
+        | (Thing::HalfSpace(half_space), Thing::Capsule { capsule, pose }) => {
+            Bracket::of_signed(capsule_above_half_space(capsule, pose, half_space, threshold), threshold)
         }
         (Thing::Capsule { .. }, _) | (_, Thing::Capsule { .. }) => {
             let found = solver.capsule_distance(pair, &options);

@@ -2,8 +2,8 @@
 
 use sublevel_core::body::{Shape, Solid};
 use sublevel_core::measure::{
-    Decision, HalfSpaceDistance, Options, Pose, WarmStart, distance_to_half_space, nearer_to_half_space_than,
-    overlap_with_half_space,
+    Capsule, Decision, HalfSpaceDistance, Options, Pose, WarmStart, capsule_nearer_to_half_space_than,
+    distance_to_half_space, nearer_to_half_space_than, overlap_of_capsule_with_half_space, overlap_with_half_space,
 };
 
 use super::ask::{Ask, Measure};
@@ -97,32 +97,65 @@ impl Solver<'_> {
         (slots, options): (Option<PairSlots>, &Options<'_>),
     ) -> Decision {
         let plane = &half_space.half_space;
-        let open = Decision::Undecided { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
         let ball = solid.circumscribed();
         let slack = half_space.slack_m(pose.translation().norm() + ball.center.norm() + ball.radius);
         self.warm(slots, [0; 2], Measure::Signed, |warm| {
-            if slack == 0.0 && threshold == 0.0 {
-                return overlap_with_half_space(solid, pose, plane, options, warm);
-            }
-            // Only thresholds that are no numbers are refused.
-            let mut below = |threshold: f64| {
-                nearer_to_half_space_than(solid, pose, plane, threshold, options, warm).unwrap_or(open)
-            };
-            if slack == 0.0 {
-                return below(threshold);
-            }
-            // What holds of this plane by that much more holds of all.
-            let (least, most) = ((threshold - slack).next_down(), (threshold + slack).next_up());
-            let known = match below(most) {
-                Decision::No => return Decision::No,
-                Decision::Undecided { lower, upper } => [lower, upper],
-                Decision::Yes => match below(least) {
-                    Decision::Yes => return Decision::Yes,
-                    Decision::Undecided { lower, upper } => [lower, upper],
-                    Decision::No => [least, most],
-                },
-            };
-            Decision::Undecided { lower: (known[0] - slack).next_down(), upper: (known[1] + slack).next_up() }
+            for_all_planes(slack, threshold, |asked| match asked {
+                Asked::Overlap => overlap_with_half_space(solid, pose, plane, options, warm),
+                // Only thresholds that are no numbers are refused.
+                Asked::NearerThan(threshold) => {
+                    nearer_to_half_space_than(solid, pose, plane, threshold, options, warm).unwrap_or(OPEN)
+                }
+            })
         })
     }
+}
+
+/// The same of a capsule.
+pub(crate) fn capsule_above_half_space(
+    capsule: &Capsule,
+    pose: &Pose,
+    half_space: &WorldHalfSpace,
+    threshold: f64,
+) -> Decision {
+    let plane = &half_space.half_space;
+    let slack = half_space.slack_m(pose.translation().norm() + capsule.reach_m());
+    for_all_planes(slack, threshold, |asked| match asked {
+        Asked::Overlap => overlap_of_capsule_with_half_space(capsule, pose, plane),
+        // Only thresholds that are no numbers are refused.
+        Asked::NearerThan(threshold) => {
+            capsule_nearer_to_half_space_than(capsule, pose, plane, threshold).unwrap_or(OPEN)
+        }
+    })
+}
+
+/// What is known of a signed distance that nothing was found out about.
+const OPEN: Decision = Decision::Undecided { lower: f64::NEG_INFINITY, upper: f64::INFINITY };
+
+/// A question about the signed distance from one plane.
+enum Asked {
+    /// Whether it is at most 0.
+    Overlap,
+    /// Whether it is below a threshold, metres.
+    NearerThan(f64),
+}
+
+/// Whether a signed distance is below a threshold, metres, or at most 0: for all planes whose
+/// distances differ by `slack` metres at most from those of the plane that `decide` is about.
+fn for_all_planes(slack: f64, threshold: f64, mut decide: impl FnMut(Asked) -> Decision) -> Decision {
+    if slack == 0.0 {
+        return decide(if threshold == 0.0 { Asked::Overlap } else { Asked::NearerThan(threshold) });
+    }
+    // What holds of this plane by that much more holds of all.
+    let (least, most) = ((threshold - slack).next_down(), (threshold + slack).next_up());
+    let known = match decide(Asked::NearerThan(most)) {
+        Decision::No => return Decision::No,
+        Decision::Undecided { lower, upper } => [lower, upper],
+        Decision::Yes => match decide(Asked::NearerThan(least)) {
+            Decision::Yes => return Decision::Yes,
+            Decision::Undecided { lower, upper } => [lower, upper],
+            Decision::No => [least, most],
+        },
+    };
+    Decision::Undecided { lower: (known[0] - slack).next_down(), upper: (known[1] + slack).next_up() }
 }

@@ -85,6 +85,35 @@ fn distances_of_capsules_have_closed_forms() {
     }
 }
 
+/// Above floors that stand, that were moved and that were turned: on either side of contact and
+/// of a threshold, with the floor first and last.
+#[test]
+fn capsules_above_floors_are_decided_on_both_sides() {
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -0.2, 0.1));
+    // The floor of the room is 2 m below its frame.
+    for (turn, moved) in [(UnitQuaternion::identity(), 0.0), (UnitQuaternion::identity(), 0.7), (turn, -0.4)] {
+        let normal = turn * Vector3::z();
+        // Turned about its own origin, and that many metres up along its normal.
+        let floor_pose = Pose::from_quaternion(normal * moved, turn.coords.into()).expect("a pose");
+        // How high the middle of the limb is above a plane that its lower end touches, metres.
+        let middle = LIMB.0 + LIMB.1 * normal.z;
+        for gap in [-0.3, -1e-9, 1e-9, 0.2 - 1e-9, 0.2 + 1e-9, 0.3] {
+            let place = normal * (moved - 2.0 + middle + gap);
+            let poses = vec![("floor".into(), floor_pose), ("limb".into(), at(place.x, place.y, place.z))];
+            let scene = room().updated(&Update { poses, ..Update::default() }, |_| None).expect("an update");
+            for names in [["limb", "floor"], ["floor", "limb"]] {
+                for (threshold, measure) in [(0.0, Measure::Overlap), (0.2, Measure::NearerThan)] {
+                    let ask = Ask::new(vec![measure]).expect("a measure").with_threshold(threshold).expect("a length");
+                    let operands = names.map(|name| Operand::Object(slot(&scene, name))).to_vec();
+                    let found = answers(&scene, ask, operands)[0];
+                    let expected = if gap < threshold { Verdict::Yes } else { Verdict::No };
+                    assert_eq!(found.verdict, Some(expected), "{names:?}, {moved}, {gap:e}, {threshold}: {found:?}");
+                }
+            }
+        }
+    }
+}
+
 /// Depths are known as long as the axis is outside; what has no polynomial has no level.
 #[test]
 fn depths_of_capsules_and_what_is_not_defined() {

@@ -35,13 +35,7 @@ pub fn distance_of_capsule_to_half_space(
     options: &Options<'_>,
 ) -> HalfSpaceDistance {
     let (normal, offset) = (half_space.normal(), half_space.offset());
-    let axis = pose.transform_direction(&Vector3::z()) * capsule.half_height_m();
-    let slope = axis.dot(normal);
-    let end = pose.translation() - if slope > 0.0 { axis } else { -axis };
-    let height = normal.dot(&end) - offset - capsule.radius_m();
-    let coordinates = pose.translation().norm() + capsule.reach_m() + offset.abs();
-    let slack = (ROTATION_ERROR + gamma(16)) * coordinates;
-    let (lower, upper) = (height - slack, height + slack);
+    let Lowest { end, slope, slack, bracket: [lower, upper] } = lowest(capsule, pose, half_space);
     let reach = capsule.reach_m();
     // A point has no size of its own.
     let size = if reach > 0.0 { reach } else { pose.translation().norm().max(offset.abs()) };
@@ -53,4 +47,28 @@ pub fn distance_of_capsule_to_half_space(
         tied: capsule.half_height_m() > 0.0 && slope.abs() <= slack,
         iterations: 0,
     }
+}
+
+/// Where the axis of a capsule is lowest above a half-space, world frame, metres.
+pub(super) struct Lowest {
+    /// The lower end of the axis.
+    end: Vector3<f64>,
+    /// Height of the end of the axis on its own z axis above the centre.
+    slope: f64,
+    /// Bound of the rounding of the height.
+    slack: f64,
+    /// Proven bracket of the signed distance of the capsule.
+    pub(super) bracket: [f64; 2],
+}
+
+/// The height of a capsule above a half-space: that of the lower end of its axis, less the radius.
+pub(super) fn lowest(capsule: &Capsule, pose: &Pose, half_space: &HalfSpace) -> Lowest {
+    let (normal, offset) = (half_space.normal(), half_space.offset());
+    let axis = pose.transform_direction(&Vector3::z()) * capsule.half_height_m();
+    let slope = axis.dot(normal);
+    let end = pose.translation() - if slope > 0.0 { axis } else { -axis };
+    let height = normal.dot(&end) - offset - capsule.radius_m();
+    let coordinates = pose.translation().norm() + capsule.reach_m() + offset.abs();
+    let slack = (ROTATION_ERROR + gamma(16)) * coordinates;
+    Lowest { end, slope, slack, bracket: [height - slack, height + slack] }
 }

@@ -74,11 +74,12 @@ pub fn nearer_to_half_space_than(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Result<Decision, SignedThresholdError> {
-    if !threshold.is_finite() {
-        return Err(SignedThresholdError(threshold));
-    }
-    // Below the threshold is at most the number before it.
-    Ok(decide((solid, pose), half_space, threshold.next_down(), options, warm))
+    Ok(decide((solid, pose), half_space, most_below(threshold)?, options, warm))
+}
+
+/// The largest signed distance below a threshold, metres: the number before it.
+pub(super) fn most_below(threshold: f64) -> Result<f64, SignedThresholdError> {
+    if threshold.is_finite() { Ok(threshold.next_down()) } else { Err(SignedThresholdError(threshold)) }
 }
 
 /// Whether the signed distance is at most this, metres.
@@ -90,9 +91,14 @@ fn decide(
     warm: &mut WarmStart,
 ) -> Decision {
     let found = distance_until(of_solid, half_space, StopCriterion::compare(at_most), options, warm);
-    match decision([found.lower, found.upper], at_most) {
+    signed_decision([found.lower, found.upper], at_most)
+}
+
+/// Whether a signed distance in a bracket is at most this, metres.
+pub(super) fn signed_decision([lower, upper]: [f64; 2], at_most: f64) -> Decision {
+    match decision([lower, upper], at_most) {
         // Depths are distances here.
-        Decision::Undecided { .. } => Decision::Undecided { lower: found.lower, upper: found.upper },
+        Decision::Undecided { .. } => Decision::Undecided { lower, upper },
         decided => decided,
     }
 }

@@ -10,12 +10,14 @@
 
 mod answer;
 mod capsule;
+mod capsule_decision;
 mod decision;
 mod set;
 mod solid;
 
 pub use answer::HalfSpaceDistance;
 pub use capsule::distance_of_capsule_to_half_space;
+pub use capsule_decision::{capsule_nearer_to_half_space_than, overlap_of_capsule_with_half_space};
 pub use decision::{SignedThresholdError, nearer_to_half_space_than, overlap_with_half_space};
 pub use set::{HalfSpace, HalfSpaceError};
 

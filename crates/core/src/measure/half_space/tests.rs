@@ -9,7 +9,9 @@ use crate::measure::solver::stages::{Stage, except};
 use crate::measure::status::Status;
 use crate::measure::tests::edges::slab;
 use crate::measure::tests::{random_pose, zoo};
+use dashu_ratio::RBig;
 use nalgebra::Vector3;
+use std::cmp::Ordering;
 use sublevel_testkit::Seeded;
 
 #[test]
@@ -232,4 +234,99 @@ fn capsules_are_as_low_as_their_lower_end() {
     let lying = Capsule::new(0.1, 0.5).unwrap();
     let floor = HalfSpace::new(Vector3::x(), 0.0).unwrap();
     assert!(distance_of_capsule_to_half_space(&lying, &Pose::identity(), &floor, &Options::default()).tied);
+}
+
+/// Decisions near contact, and near other thresholds, against rational numbers: about 1 m and 1e6 m
+/// from the origin of the world.
+#[test]
+fn decisions_of_capsules_are_those_of_exact_heights() {
+    let (mut sides, mut open) = ([0; 2], 0);
+    for seed in 0..400 {
+        let mut random = Seeded(95_000 + seed);
+        // How far it is from the origin, and the least gap that has to be decided, metres: rounding
+        // hides less than 1e-13 m near the origin and less than 1e-7 m far from it.
+        let (far, decided) = if seed % 2 == 0 { (1.0, 1e-12) } else { (1e6, 1e-6) };
+        let [radius, half] = [(); 2].map(|()| [0.0, 0.3, 1.0][random.index(3)] * random.between(0.5, 1.0));
+        let capsule = Capsule::new(radius, half).unwrap();
+        let place = random_pose(&mut random, far);
+        let pose = if seed % 4 < 2 { Pose::identity().with_translation(*place.translation()) } else { place };
+        // Standing, lying along the plane up to rounding, and any.
+        let normal = match seed % 5 {
+            0 => pose.transform_direction(&Vector3::z()),
+            1 => -pose.transform_direction(&Vector3::z()),
+            2 => pose.transform_direction(&Vector3::x()),
+            _ => random.unit(),
+        };
+        let through_origin = HalfSpace::new(normal, 0.0).unwrap();
+        let contact = (exact_height_of_axis(&capsule, &pose, &through_origin) - exact(radius)).to_f64().value();
+        for gap in [0.0, 1e-16, -1e-16, 1e-12, -1e-12, 1e-6, -1e-6] {
+            for threshold in [None, Some(0.0), Some(0.25), Some(-0.25)] {
+                let half_space = HalfSpace::new(normal, contact - threshold.unwrap_or(0.0) - gap).unwrap();
+                let found = match threshold {
+                    None => overlap_of_capsule_with_half_space(&capsule, &pose, &half_space),
+                    Some(t) => capsule_nearer_to_half_space_than(&capsule, &pose, &half_space, t).unwrap(),
+                };
+                // How much higher than a level the axis is.
+                let above = |level: f64| exact_height_of_axis(&capsule, &pose, &half_space) - exact(level);
+                let at = threshold.unwrap_or(0.0);
+                let truth = match against_radius(&above(at), &capsule, &half_space) {
+                    Ordering::Less => true,
+                    Ordering::Equal => threshold.is_none(),
+                    Ordering::Greater => false,
+                };
+                let label = format!("seed {seed}, gap {gap:e}, threshold {threshold:?}: {found:?}, {truth}");
+                match found {
+                    Decision::Yes => assert!(truth, "{label}"),
+                    Decision::No => assert!(!truth, "{label}"),
+                    Decision::Undecided { lower, upper } => {
+                        assert!(lower <= at && at <= upper, "{label}");
+                        let [low, high] = [lower, upper].map(|end| against_radius(&above(end), &capsule, &half_space));
+                        assert!(low != Ordering::Less && high != Ordering::Greater, "{label}");
+                        let size = pose.translation().norm() + capsule.reach_m() + half_space.offset().abs();
+                        assert!(upper - lower <= 64.0 * f64::EPSILON * size, "{label}");
+                        open += 1;
+                    }
+                }
+                if gap.abs() >= decided {
+                    assert_eq!(found, if gap < 0.0 { Decision::Yes } else { Decision::No }, "{label}");
+                } else {
+                    sides[usize::from(truth)] += 1;
+                }
+            }
+        }
+    }
+    // Rounding puts contacts on either side, and what it hides is left open.
+    assert!(sides[0] > 500 && sides[1] > 500 && open > 1000, "{sides:?}, {open} open");
+    let (limb, floor) = (Capsule::new(0.1, 0.3).unwrap(), HalfSpace::new(Vector3::z(), 0.0).unwrap());
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let asked = capsule_nearer_to_half_space_than(&limb, &Pose::identity(), &floor, wrong);
+        assert!(matches!(asked, Err(SignedThresholdError(_))), "{wrong}: {asked:?}");
+    }
+}
+
+fn exact(x: f64) -> RBig {
+    RBig::try_from(x).unwrap()
+}
+
+/// The least `n·x - offset` over both ends of a capsule's axis, metres, without rounding: with the
+/// quaternion of the pose normalised exactly.
+fn exact_height_of_axis(capsule: &Capsule, pose: &Pose, half_space: &HalfSpace) -> RBig {
+    let [i, j, k, w] = [0, 1, 2, 3].map(|index| exact(pose.rotation().coords[index]));
+    let (two, square) = (exact(2.0), &i * &i + &j * &j + &k * &k + &w * &w);
+    // The third column of the rotation, times the square of the quaternion's length.
+    let axis = [&two * (&i * &k + &w * &j), &two * (&j * &k - &w * &i), &w * &w + &k * &k - &i * &i - &j * &j];
+    let dot = |v: &[RBig; 3]| (0..3).fold(RBig::ZERO, |sum, index| sum + exact(half_space.normal()[index]) * &v[index]);
+    let half = exact(capsule.half_height_m()) * dot(&axis) / square;
+    let center = dot(&[0, 1, 2].map(|index| exact(pose.translation()[index]))) - exact(half_space.offset());
+    let [down, up] = [&center - &half, &center + &half];
+    down.min(up)
+}
+
+/// How a height of the axis compares with the radius, times the length of the stored normal.
+fn against_radius(height: &RBig, capsule: &Capsule, half_space: &HalfSpace) -> Ordering {
+    if *height < RBig::ZERO {
+        return Ordering::Less;
+    }
+    let square = half_space.normal().iter().fold(RBig::ZERO, |sum, &n| sum + exact(n) * exact(n));
+    (height * height).cmp(&(square * exact(capsule.radius_m()) * exact(capsule.radius_m())))
 }
