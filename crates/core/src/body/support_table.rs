@@ -14,7 +14,7 @@ use super::direction_grid::{self, CELLS, CORNERS, corner, middle};
 use super::radial::radius;
 use super::sphere::Sphere;
 use crate::polynomial::{Number, Simd};
-use nalgebra::{Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
+use nalgebra::{Const, DimMin, Matrix2, Matrix3, Matrix3x2, SMatrix, SVector, Vector3};
 
 /// Numbers of a cell: `W z`, and `W K Wᵀ` by its distinct entries.
 const FIELDS: usize = 9;
@@ -248,24 +248,42 @@ impl<'a> SupportTracer<'a> {
         found.unwrap_or((start, vec![order[0]]))
     }
 
-    /// The point of the body farthest along `e` (normalized coordinates), by Newton's method on `e
-    /// = Σ ν_i ∇g_i`, `g_i = 1` over the active constraints. None where it does not converge, as
-    /// where the surface is flat, or other ones are active.
+    /// The point of the body farthest along `e` (normalized coordinates), and the constraints that
+    /// are active there, from a guess of both; at most three are active.
     fn farther(&self, e: &Vector3<f64>, start: &Vector3<f64>, active: &[usize]) -> Option<(Vector3<f64>, Vec<usize>)> {
+        match active.len() {
+            1 => self.newton::<4>(e, start, active),
+            2 => self.newton::<5>(e, start, active),
+            _ => self.newton::<6>(e, start, active),
+        }
+    }
+
+    /// Newton's method on `e = Σ ν_i ∇g_i`, `g_i = 1` over the active constraints, for N unknowns:
+    /// the point and the multipliers. None where it does not converge, as where the surface is
+    /// flat, or other constraints are active.
+    fn newton<const N: usize>(
+        &self,
+        e: &Vector3<f64>,
+        start: &Vector3<f64>,
+        active: &[usize],
+    ) -> Option<(Vector3<f64>, Vec<usize>)>
+    where
+        Const<N>: DimMin<Const<N>, Output = Const<N>>,
+    {
         let count = active.len();
         let mut z = *start;
         let mut weights: Option<Vector3<f64>> = None;
         for _ in 0..16 {
             let mut gradients = Matrix3::zeros();
-            // Rows of constraints beyond the active ones set their multipliers to zero.
-            let mut matrix = SMatrix::<f64, 6, 6>::identity();
-            let mut right = SVector::<f64, 6>::zeros();
+            let mut matrix = SMatrix::<f64, N, N>::zeros();
+            let mut right = SVector::<f64, N>::zeros();
             right.fixed_rows_mut::<3>(0).copy_from(e);
             let jets = active.iter().map(|&i| self.constraints[i].polynomial.evaluate(&z));
             let mut hessians = [Matrix3::zeros(); 3];
             for (k, jet) in jets.enumerate() {
                 gradients.set_column(k, &jet.gradient);
-                matrix[(3 + k, 3 + k)] = 0.0;
+                matrix.fixed_view_mut::<3, 1>(0, 3 + k).copy_from(&jet.gradient);
+                matrix.fixed_view_mut::<1, 3>(3 + k, 0).copy_from(&jet.gradient.transpose());
                 right[3 + k] = 1.0 - jet.value;
                 hessians[k] = jet.hessian;
             }
@@ -279,11 +297,10 @@ impl<'a> SupportTracer<'a> {
             };
             let bent = hessians[0] * known.x + hessians[1] * known.y + hessians[2] * known.z;
             matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(&bent);
-            matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(&gradients);
-            matrix.fixed_view_mut::<3, 3>(3, 0).copy_from(&gradients.transpose());
             let solution = matrix.lu().solve(&right)?;
             let step = solution.fixed_rows::<3>(0).into_owned();
-            let next = solution.fixed_rows::<3>(3).into_owned();
+            // Multipliers of constraints beyond the active ones are zero.
+            let next = Vector3::from_fn(|k, _| if k < count { solution[3 + k] } else { 0.0 });
             let length = step.norm();
             z += step * (0.25 / length).min(1.0);
             if length < 1e-6 {
