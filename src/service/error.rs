@@ -54,7 +54,7 @@ pub(super) fn not_found(reason: Reason, name: &str, field: &str, why: impl fmt::
     let mut details = details(reason);
     let why = short(why.to_string());
     let kind = reason.name().trim_end_matches("_NOT_FOUND").to_lowercase();
-    details.set_resource_info(kind, name, "", why.clone());
+    details.set_resource_info(kind, short(name.to_owned()), "", why.clone());
     details.add_bad_request_violation(field, why.clone());
     Status::with_error_details(Code::NotFound, format!("{field}: {why}"), details)
 }

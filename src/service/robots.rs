@@ -139,7 +139,7 @@ const PAIR_NUMBERS: usize = 24;
 const MAX_PAIRS_NUMBERS: usize = MAX_MESSAGE_BYTES / 8;
 
 /// Why a robot is not loaded; `links` are those that the request gives bodies for.
-fn load_error(error: &CatalogueError, links: &[String]) -> Status {
+pub(super) fn load_error(error: &CatalogueError, links: &[String]) -> Status {
     let at = |link: &str, leaf: &str| match links.iter().position(|named| named == link) {
         Some(index) => format!("link_bodies[{index}]{leaf}"),
         None => "link_bodies".to_owned(),

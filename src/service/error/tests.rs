@@ -154,3 +154,12 @@ fn failures_of_the_disk_name_no_path() {
         assert!(!status.message().contains("secret"), "{}", status.message());
     }
 }
+
+#[test]
+fn names_that_are_not_found_are_shown_in_part() {
+    let name = "x".repeat(100_000);
+    let status = not_found(Reason::RobotNotFound, &name, "robot", format!("no robot \"{name}\"; place it first"));
+    assert!(status.message().len() < 1100 && status.details().len() < 5120, "{}", status.details().len());
+    let resource = status.get_details_resource_info().expect("a resource");
+    assert_eq!(resource.resource_name, format!("{}…", &name[..1024]));
+}

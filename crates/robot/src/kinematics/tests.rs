@@ -241,3 +241,27 @@ fn values_are_checked_by_name() {
     assert_eq!(kinematics.check(&defaults[1..]), Err(ConfigurationError::Width { given: 8, width: 9 }));
     assert_eq!((kinematics.link("wheel"), kinematics.parent(2), kinematics.parent(0)), (Some(2), Some(1), None));
 }
+
+#[test]
+fn the_reach_of_followers_is_that_of_what_they_follow() {
+    let link = |name: &str| Link { name: name.into(), collisions: Vec::new() };
+    let joint = |name: &str, kind: JointKind, child: usize, mimic: Option<Mimic>| Joint {
+        name: name.into(),
+        kind,
+        parent: child - 1,
+        child,
+        origin: Isometry3::translation(1.0, 0.0, 0.0),
+        axis: Vector3::z_axis(),
+        limits: None,
+        mimic,
+    };
+    let reach_m = |multiplier: f64| {
+        let follows = Some(Mimic { joint: 0, multiplier, offset: -0.5 });
+        let joints =
+            vec![joint("wheel", JointKind::Continuous, 1, None), joint("slide", JointKind::Prismatic, 2, follows)];
+        let links = ["base", "wheel", "slide"].map(link).into();
+        Kinematics::new(&Description { name: "robot".into(), links, joints }).expect("a tree").reach_m()
+    };
+    // Two origins 1 m from those before, and a slide that stays 0.5 m from its place, or has no end.
+    assert_eq!((reach_m(0.0), reach_m(0.1)), (2.5, f64::INFINITY));
+}

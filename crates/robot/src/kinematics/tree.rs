@@ -203,7 +203,9 @@ impl Kinematics {
                 let followed = self.variables.iter().find(|variable| variable.first == joint.first);
                 let farthest = followed.and_then(|variable| variable.limits);
                 let farthest = farthest.map_or(f64::INFINITY, |limits| limits.lower.abs().max(limits.upper.abs()));
-                joint.mimic.map_or(farthest, |(multiplier, offset)| multiplier.abs() * farthest + offset.abs())
+                // A multiplier of 0 keeps it at its offset; 0 times infinity would be NaN.
+                let follows = |multiplier: f64| if multiplier == 0.0 { 0.0 } else { multiplier.abs() * farthest };
+                joint.mimic.map_or(farthest, |(multiplier, offset)| follows(multiplier) + offset.abs())
             }
         };
         self.joints.iter().map(|joint| joint.translation.norm() + travel(joint)).sum()

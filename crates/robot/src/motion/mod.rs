@@ -16,6 +16,8 @@ mod certificate_error;
 mod claim;
 mod claim_of_problem;
 mod derive;
+#[cfg(fuzzing)]
+pub mod fuzzing;
 mod geometry;
 mod interval;
 mod path;

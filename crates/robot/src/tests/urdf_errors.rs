@@ -81,7 +81,7 @@ fn numbers() {
         bad("xyz=\"0 0 1\"", "xyz=\"0 0 1e999\"", 5, path, "not finite"),
         bad("xyz=\"0 0 1\"", "xyz=\"0 0 2e6\"", 5, path, "beyond 1e6 metres"),
         bad("rpy=\"0 0 0\"", "rpy=\"0 nan 0\"", 5, path, "rpy holds \"nan\""),
-        bad("rpy=\"0 0 0\"", "ryp=\"0 0 0\"", 5, path, "an origin has no attribute ryp"),
+        bad("rpy=\"0 0 0\"", "ryp=\"0 0 0\"", 5, path, "an origin has no attribute \"ryp\""),
         bad("rpy=\"0 0 0\"", "quat_xyzw=\"0 0 0 1\"", 5, path, "the rotation as rpy"),
     ]);
     let error = read_urdf(&ROBOT.replacen("rpy=\"0 0 0\"", "rpy=\"0 0 x\"", 1)).expect_err("refused");

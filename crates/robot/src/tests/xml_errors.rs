@@ -72,3 +72,16 @@ fn an_srdf_has_the_same_limits() {
     let error = read_srdf("<robot name=\"r\">\n<group name=\"${a}\"/></robot>", &robot).expect_err("refused");
     assert_eq!((error.line, error.path.as_str()), (2, "robot/group[${a}]"));
 }
+
+#[test]
+fn errors_show_the_start_of_a_long_attribute() {
+    let (long, shown) = ("x".repeat(10_000), "x".repeat(80));
+    let origin = |attribute: &str| {
+        let inside = format!("<geometry><sphere radius=\"1\"/></geometry><origin {attribute}/>");
+        format!("<robot name=\"r\"><link name=\"a\"><collision>{inside}</collision></link></robot>")
+    };
+    for (value, says) in [("0", "an origin has no attribute \""), ("${y}", "/origin: ")] {
+        let error = refused(&origin(&format!("{long}=\"{value}\""))).to_string();
+        assert!(error.contains(&format!("{says}{shown}...")) && error.len() < 500, "{error}");
+    }
+}

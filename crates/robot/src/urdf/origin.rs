@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 
 use super::geometry::MOST_METRES;
 use crate::error::DescriptionError;
-use crate::xml::Element;
+use crate::xml::{Element, quoted};
 
 /// The pose of the `<origin>` of an element, the identity if there is none: frame of the element to
 /// the frame that it is in, metres. Its rotation is `Rz(yaw) Ry(pitch) Rx(roll)`.
@@ -25,7 +25,7 @@ fn check_attributes(element: Element<'_, '_>) -> Result<(), DescriptionError> {
     match element.attributes().find(|(name, _)| !["xyz", "rpy"].contains(name)) {
         None => Ok(()),
         Some((name, _)) => {
-            let problem = format!("an origin has no attribute {name}");
+            let problem = format!("an origin has no attribute {}", quoted(name));
             Err(element.attribute_error(name, problem, "write the position as xyz and the rotation as rpy"))
         }
     }

@@ -1,5 +1,6 @@
 //! Texts that xacro has yet to turn into URDF.
 
+use super::text::shortened;
 use super::{Element, quoted};
 use crate::error::DescriptionError;
 
@@ -15,7 +16,7 @@ pub(super) fn check(root: Element<'_, '_>) -> Result<(), DescriptionError> {
         }
         for (name, value) in element.attributes() {
             if value.contains("${") || value.contains("$(") {
-                let problem = format!("{name} is {}, an expression of xacro", quoted(value));
+                let problem = format!("{} is {}, an expression of xacro", shortened(name), quoted(value));
                 return Err(element.attribute_error(name, problem, REMEDY));
             }
         }

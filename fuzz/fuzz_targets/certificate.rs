@@ -1,0 +1,3 @@
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|text: &str| sublevel::robot::motion::fuzzing::certificate(text));
