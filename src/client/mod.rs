@@ -55,6 +55,6 @@ pub use motions::{CheckedMotion, CheckedMotions, MotionsQuestion};
 pub use pose_stream::{PoseStream, StreamedPoses};
 pub use queries::{Answers, PairRow, Question};
 pub use robot_files::{RobotFiles, RobotFilesError};
-pub use robots::{ListedRobot, RobotPlacement, StoredGroup, StoredLink, StoredRobot};
+pub use robots::{ListedRobot, RobotPlacement, StoredGroup, StoredGroupState, StoredLink, StoredRobot};
 pub use scenes::{ListedScene, SceneState};
 pub use states::{CheckedStates, StatesQuestion};

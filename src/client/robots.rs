@@ -27,6 +27,8 @@ pub struct StoredRobot {
     pub joints: Vec<Variable>,
     /// Groups of the SRDF, with the names of joints and links.
     pub groups: Vec<StoredGroup>,
+    /// Named states of the groups, in the order of the SRDF.
+    pub group_states: Vec<StoredGroupState>,
     /// What is odd in the SRDF.
     pub warnings: Vec<String>,
     /// Whether the call made it; false when the server had it before.
@@ -55,6 +57,25 @@ pub struct StoredGroup {
     pub joints: Vec<String>,
     /// Names of its links.
     pub links: Vec<String>,
+}
+
+/// Values of joints of a group under a name: a `group_state` of the SRDF.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredGroupState {
+    /// Its name, unique in its group.
+    pub name: String,
+    /// Name of the group.
+    pub group: String,
+    /// The joints with values of their own that it sets, in the order of joint vectors, and their
+    /// values: radians, metres, unit quaternions. Without names it sets none of these.
+    pub joints: NamedJointValues,
+}
+
+impl StoredGroupState {
+    /// Names of the joints that it sets, as questions take them: the values go with them.
+    pub fn joint_names(&self) -> impl Iterator<Item = &str> {
+        self.joints.joints.iter().map(|name| &**name)
+    }
 }
 
 /// A robot in a list.
@@ -116,7 +137,7 @@ impl RobotPlacement {
 impl StoredRobot {
     fn of(robot: Option<proto::Robot>, created: bool) -> Result<Self, ClientError> {
         let unreadable = || ClientError::Unexpected("a robot that cannot be read");
-        let proto::Robot { summary, links, joints, groups, warnings } = robot.ok_or_else(unreadable)?;
+        let proto::Robot { summary, links, joints, groups, warnings, group_states } = robot.ok_or_else(unreadable)?;
         let summary = summary.ok_or_else(unreadable)?;
         let link = |link: proto::RobotLink| {
             let body = if link.body_id.is_empty() { None } else { Some(link.body_id.parse().ok()?) };
@@ -129,6 +150,7 @@ impl StoredRobot {
             links: links.into_iter().map(link).collect::<Option<_>>().ok_or_else(unreadable)?,
             joints: joints.iter().map(variable).collect::<Option<_>>().ok_or_else(unreadable)?,
             groups: groups.into_iter().map(group).collect(),
+            group_states: group_states.into_iter().enumerate().map(group_state).collect::<Result<_, _>>()?,
             warnings,
             created,
         })
@@ -137,6 +159,12 @@ impl StoredRobot {
 
 fn group(proto::RobotGroup { name, joints, links }: proto::RobotGroup) -> StoredGroup {
     StoredGroup { name, joints, links }
+}
+
+fn group_state((index, state): (usize, proto::RobotGroupState)) -> Result<StoredGroupState, ClientError> {
+    let proto::RobotGroupState { name, group, joints } = state;
+    let field = |leaf: &str| format!("robot.group_states[{index}].joints{leaf}");
+    Ok(StoredGroupState { name, group, joints: robot_wire::joint_values(joints.as_ref(), field)? })
 }
 
 fn variable(joint: &proto::RobotJoint) -> Option<Variable> {

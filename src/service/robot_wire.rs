@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::measure::Pose;
-use crate::robot::{JointKind, Variable};
+use crate::robot::{GroupState, JointKind, Variable};
 use crate::scene::{NamedJointValues, PlaceRobot, Robot, RobotId, RobotInstance, RobotLink};
 use crate::store::{LoadedRobot, RobotSource};
 
@@ -50,12 +50,23 @@ pub(super) fn robot(loaded: &LoadedRobot) -> proto::Robot {
         joints: group.joints.iter().map(|&joint| description.joints[joint].name.to_string()).collect(),
         links: group.links.iter().map(|&link| description.links[link].name.to_string()).collect(),
     };
+    let state = |state: &GroupState| {
+        let own = state.own_values(&description.joints);
+        let joints = own.iter().map(|(joint, _)| joint.name.to_string()).collect();
+        let values: Vec<f64> = own.iter().flat_map(|(_, values)| *values).copied().collect();
+        proto::RobotGroupState {
+            name: state.name.to_string(),
+            group: loaded.semantics.groups[state.group].name.to_string(),
+            joints: Some(proto::JointValues { joints, values: numbers(&values), rows: Vec::new() }),
+        }
+    };
     proto::Robot {
         summary: Some(summary(robot)),
         links: names.iter().zip(robot.links()).enumerate().map(link).collect(),
         joints: kinematics.variables().iter().map(joint).collect(),
         groups: loaded.semantics.groups.iter().map(group).collect(),
         warnings: loaded.semantics.warnings.iter().map(ToString::to_string).collect(),
+        group_states: loaded.semantics.states.iter().map(state).collect(),
     }
 }
 

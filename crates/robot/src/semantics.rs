@@ -3,6 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
+use crate::description::Joint;
+
 /// The content of an SRDF. Links, joints and groups are positions in the lists of the
 /// [`Description`](crate::Description) and of this.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -108,6 +110,19 @@ pub struct GroupState {
     pub values: Vec<JointValues>,
     /// Values of virtual joints, in the order of the file.
     pub virtual_values: Vec<JointValues>,
+}
+
+impl GroupState {
+    /// The joints with values of their own that the state sets, and these values, in the order of
+    /// configurations. Joints that mimic another one and virtual joints have no place in a
+    /// configuration and are left out. `joints` are those of the description.
+    pub fn own_values<'s>(&'s self, joints: &'s [Joint]) -> Vec<(&'s Joint, &'s [f64])> {
+        let mut own: Vec<&JointValues> =
+            self.values.iter().filter(|values| joints[values.joint].mimic.is_none()).collect();
+        // The joints of a configuration are in the order of the description.
+        own.sort_unstable_by_key(|values| values.joint);
+        own.into_iter().map(|values| (&joints[values.joint], &values.values[..])).collect()
+    }
 }
 
 /// Values of a joint.

@@ -8,7 +8,7 @@ use super::link_fit::FittedLink;
 use super::pairs::Pairs;
 use crate::body::{Body, Solid};
 use crate::client::StoredRobot;
-use crate::robot::Semantics;
+use crate::robot::{GroupState, Joint, Kinematics, Semantics};
 use crate::scene::{Geometry, Robot};
 
 /// A robot as it would be loaded.
@@ -27,6 +27,8 @@ pub(super) struct Report {
     /// Pairs that may touch: neighbours, and what the SRDF disables.
     allowed_pairs: usize,
     groups: Vec<String>,
+    /// Named states of the groups, in the order of the SRDF.
+    group_states: Vec<StateRow>,
     warnings: Vec<String>,
     /// Whether a server has made it; none without a server.
     created: Option<bool>,
@@ -40,6 +42,21 @@ struct JointRow {
     name: String,
     lower: Option<f64>,
     upper: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct StateRow {
+    name: String,
+    group: String,
+    /// The joints with values of their own that it sets, in the order of joint vectors.
+    joints: Vec<StateJoint>,
+}
+
+#[derive(Serialize)]
+struct StateJoint {
+    name: String,
+    /// As many as the joint takes: radians, metres, a unit quaternion.
+    values: Vec<f64>,
 }
 
 #[derive(Serialize)]
@@ -83,6 +100,7 @@ impl Report {
             checked_pairs: pairs().count() - allowed_pairs,
             allowed_pairs,
             groups: semantics.groups.iter().map(|group| group.name.to_string()).collect(),
+            group_states: semantics.states.iter().map(|state| StateRow::new(state, semantics, kinematics)).collect(),
             warnings: semantics.warnings.iter().map(ToString::to_string).collect(),
             created: None,
             pairs: None,
@@ -123,7 +141,31 @@ impl Report {
             Some(false) => ", loaded before",
         };
         writeln!(out, "id {}{state}", self.id)?;
+        self.group_states.iter().try_for_each(|state| state.write(out))?;
         self.pairs.as_ref().map_or(Ok(()), |pairs| pairs.write(out))
+    }
+}
+
+impl StateRow {
+    fn new(state: &GroupState, semantics: &Semantics, kinematics: &Kinematics) -> Self {
+        let own = state.own_values(&kinematics.description().joints);
+        let joint =
+            |(joint, values): (&Joint, &[f64])| StateJoint { name: joint.name.to_string(), values: values.to_vec() };
+        Self {
+            name: state.name.to_string(),
+            group: semantics.groups[state.group].name.to_string(),
+            joints: own.into_iter().map(joint).collect(),
+        }
+    }
+
+    fn write(&self, out: &mut impl Write) -> io::Result<()> {
+        let mut joints = Vec::new();
+        for StateJoint { name, values } in &self.joints {
+            let values: Vec<String> = values.iter().map(ToString::to_string).collect();
+            joints.push(format!("{name} {}", values.join(" ")));
+        }
+        let joints = if joints.is_empty() { "no joint with values of its own".to_owned() } else { joints.join(", ") };
+        writeln!(out, "state {} of group {}: {joints}", self.name, self.group)
     }
 }
 

@@ -8,6 +8,7 @@ use sublevel::client::{CertificateQuestion, MotionsQuestion};
 use sublevel::scene::query::StateVerdict;
 use sublevel::store::RobotSource;
 
+use super::group_states::STATES;
 use super::{CUBE, ODD, ODD_SRDF, SRDF, URDF, cell, served};
 use crate::harness::{Running, run};
 
@@ -138,6 +139,32 @@ fn a_robot_is_fitted_within_its_gap_and_kept() {
     assert_eq!(row(&files.load("crane.urdf", &["--max-gap", "1cm"]), "hand")["source"], "fitted");
     assert_eq!(files.bodies().len(), 4);
     assert_eq!(std::fs::read_to_string(body).expect("a file"), before);
+}
+
+#[test]
+fn states_of_groups_are_listed() {
+    let files = Files::new();
+    files.write("crane.srdf", STATES);
+    let report = files.load("crane.urdf", &["--degree", "2"]);
+    let joint = |name: &str, value: f64| serde_json::json!({"name": name, "values": [value]});
+    let expected = serde_json::json!([
+        {"name": "home", "group": "all", "joints": [joint("lift", -1.25), joint("slide", 0.125)]},
+        {"name": "reach", "group": "all", "joints": [joint("lift", 1.5), joint("slide", 0.1)]},
+        {"name": "home", "group": "tip", "joints": [joint("slide", 0.2)]},
+        {"name": "home", "group": "base", "joints": []},
+    ]);
+    assert_eq!(report["group_states"], expected);
+    let (urdf, srdf, out) = (files.path("crane.urdf"), files.path("crane.srdf"), files.path("new/links"));
+    let table = run(&["robot", &urdf, "--srdf", &srdf, "--out", &out, "--degree", "2"]);
+    let table = String::from_utf8(table.stdout).expect("text");
+    let states: Vec<&str> = table.lines().filter(|line| line.starts_with("state ")).collect();
+    let expected = [
+        "state home of group all: lift -1.25, slide 0.125",
+        "state reach of group all: lift 1.5, slide 0.1",
+        "state home of group tip: slide 0.2",
+        "state home of group base: no joint with values of its own",
+    ];
+    assert_eq!(states, expected, "{table}");
 }
 
 #[test]

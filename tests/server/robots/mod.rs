@@ -8,6 +8,7 @@ mod derived_jobs;
 mod explained;
 #[cfg(feature = "fit")]
 mod files;
+mod group_states;
 mod kept;
 mod meshes;
 mod motions;

@@ -1,7 +1,7 @@
 //! What SRDFs are read as.
 
 use super::robots;
-use crate::{Description, JointValues, Semantics, VirtualJointKind, read_srdf, read_urdf};
+use crate::{Description, JointValues, Kinematics, Semantics, VirtualJointKind, read_srdf, read_urdf};
 
 fn two_arms() -> Description {
     read_urdf(&robots::two_arms("planar")).expect("a robot")
@@ -75,6 +75,38 @@ fn states_end_effectors_and_joints() {
     assert_eq!(semantics.passive_joints, [joint("right_2_joint")]);
     let tool = &semantics.end_effectors[0];
     assert_eq!((&*tool.name, tool.group, tool.parent_group), ("tool", 4, Some(0)));
+}
+
+#[test]
+fn states_have_values_for_configurations() {
+    let own = |robot: &Description, text: &str| -> Vec<(String, Vec<f64>)> {
+        let semantics = read_srdf(text, robot).expect("semantics");
+        let order: Vec<_> = Kinematics::new(robot).expect("a tree").variables().to_vec();
+        let own = semantics.states[0].own_values(&robot.joints);
+        let place = |name: &str| order.iter().position(|variable| &*variable.name == name).expect("a variable");
+        assert!(own.is_sorted_by_key(|(joint, _)| place(&joint.name)));
+        own.into_iter().map(|(joint, values)| (joint.name.to_string(), values.to_vec())).collect()
+    };
+    let mobile = read_urdf(&robots::mobile_manipulator()).expect("a robot");
+    let text = r#"<robot name="mobile">
+  <group name="some"><chain base_link="base" tip_link="left_finger"/><joint name="right_finger_joint"/></group>
+  <group_state name="holds" group="some">
+    <joint name="right_finger_joint" value="-0.02"/><joint name="left_finger_joint" value="0.02"/>
+    <joint name="lift" value="0.25"/>
+  </group_state>
+</robot>"#;
+    let expected = [("lift".to_owned(), vec![0.25]), ("left_finger_joint".to_owned(), vec![0.02])];
+    assert_eq!(own(&mobile, text), expected, "the other finger follows");
+    let text = r#"<robot name="two_arms">
+  <virtual_joint name="world_joint" type="planar" parent_frame="map" child_link="world"/>
+  <group name="arm"><joint name="world_joint"/><chain base_link="world" tip_link="left_2"/></group>
+  <group_state name="home" group="arm">
+    <joint name="left_0_joint" value="0.5"/><joint name="world_joint" value="3 4 5"/>
+    <joint name="base" value="1 2 -0.5"/>
+  </group_state>
+</robot>"#;
+    let expected = [("base".to_owned(), vec![1.0, 2.0, -0.5]), ("left_0_joint".to_owned(), vec![0.5])];
+    assert_eq!(own(&two_arms(), text), expected);
 }
 
 #[test]
