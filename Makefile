@@ -63,6 +63,7 @@ fuzz:
 
 draws: setup
 	SUBLEVEL_LONG=$(DRAWS) cargo test --release -p sublevel-core --test stability
+	SUBLEVEL_LONG=$(DRAWS) cargo test --release -p sublevel-fit --test solvers degenerate_clouds
 
 measures:
 	@[ -d '$(SUBLEVEL_DATA)' ] || { echo 'measures: the meshes are missing; name their folder: SUBLEVEL_DATA=DIR make measures' >&2; exit 1; }

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use nalgebra::Vector3;
 use sublevel_fit::{Fit, FitError, FitOptions, Solver, fit, read_mesh};
 use sublevel_testkit::catalogue::clouds::{DRAWN_KINDS, Must, drawn};
+use sublevel_testkit::random::few_or;
 use sublevel_testkit::{Seeded, data};
 
 fn by(solver: Solver, degree: usize, points: &[Vector3<f64>]) -> Result<Fit, FitError> {
@@ -85,7 +86,8 @@ fn points_on_a_quartic_are_fitted_by_both() {
 #[test]
 fn degenerate_clouds_are_certified_or_refused_by_name() {
     let [mut fitted, mut refused] = [0; 2];
-    for seed in 0..200 {
+    let count = few_or(70, 200);
+    for seed in 0..count {
         let mut random = Seeded(seed);
         let (name, points, must) = drawn(seed % DRAWN_KINDS, &mut random);
         let degree = [2, 4, 6][random.index(3)];
@@ -112,5 +114,5 @@ fn degenerate_clouds_are_certified_or_refused_by_name() {
         }
     }
     println!("{fitted} fitted, {refused} refused");
-    assert!(fitted > 250 && refused > 20);
+    assert!(fitted > 5 * count / 4 && refused > count / 10);
 }

@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn both_hold_all_points_and_are_no_larger_than_needed() {
         let mut random = Random(5);
-        for _ in 0..20 {
+        for _ in 0..6 {
             let turn = random.rotation();
             let shift = random.direction() * 3.0;
             // Of a capsule of radius 0.3 whose axis is 1.4 long: the cylinder around it is known.
