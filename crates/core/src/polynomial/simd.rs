@@ -83,8 +83,16 @@ pub fn dispatch_lanes<T: WithSimd>(work: T) -> T::Output {
 pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
     match *SUITED {
         Some(avx2) => Simd::vectorize(avx2, work),
-        None => Simd::vectorize(Scalar, work),
+        None => on_baseline(work),
     }
+}
+
+/// Does work without AVX2. It is compiled once for all that ask for it: inlined into each of them it
+/// was a third of the code of this crate, of which hardly a processor runs anything.
+#[cfg(target_arch = "x86_64")]
+#[inline(never)]
+fn on_baseline<T: WithSimd>(work: T) -> T::Output {
+    Simd::vectorize(Scalar, work)
 }
 
 /// Does work with the widest arithmetic in use.
