@@ -160,7 +160,8 @@ fn add_edges(tables: &Tables, links: Representation, add: &mut impl FnMut(String
             add(format!("{what}, 99th percentile, {words}{suffix}"), p99 / unit_us, Unit::Ratio);
         }
     }
-    let at_a_radian: [(&str, fn(&MotionRow) -> f64); 4] = [
+    type OfRow = fn(&MotionRow) -> f64;
+    let at_a_radian: [(&str, OfRow); 4] = [
         ("verification of a certificate, of the search that writes it, at 1 rad", |row| {
             row.verify_us / row.certified_us
         }),
