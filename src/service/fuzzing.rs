@@ -194,8 +194,8 @@ impl Served {
         Ok(response)
     }
 
-    /// Loads a robot, and does not store it: links come after those that they hang on, and values of
-    /// joints one after the other.
+    /// Loads a robot, and does not store it: links come after those that they hang on, and values
+    /// of joints one after the other.
     fn load_robot(&self, message: &[u8]) {
         let Ok(request) = LoadRobotRequest::decode(message) else { return };
         let links: Vec<String> = request.link_bodies.iter().map(|body| body.link.clone()).collect();

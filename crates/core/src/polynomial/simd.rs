@@ -87,8 +87,8 @@ pub fn dispatch<T: WithSimd>(work: T) -> T::Output {
     }
 }
 
-/// Does work without AVX2. It is compiled once for all that ask for it: inlined into each of them it
-/// was a third of the code of this crate, of which hardly a processor runs anything.
+/// Does work without AVX2. It is compiled once, and not inlined into each caller: the largest
+/// searches have three, and few processors run this.
 #[cfg(target_arch = "x86_64")]
 #[inline(never)]
 fn on_baseline<T: WithSimd>(work: T) -> T::Output {

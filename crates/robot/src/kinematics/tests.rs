@@ -262,6 +262,6 @@ fn the_reach_of_followers_is_that_of_what_they_follow() {
         let links = ["base", "wheel", "slide"].map(link).into();
         Kinematics::new(&Description { name: "robot".into(), links, joints }).expect("a tree").reach_m()
     };
-    // Two origins 1 m from those before, and a slide that stays 0.5 m from its place, or has no end.
+    // Two origins 1 m from those before, and a slide that stays 0.5 m from its place or has no end.
     assert_eq!((reach_m(0.0), reach_m(0.1)), (2.5, f64::INFINITY));
 }

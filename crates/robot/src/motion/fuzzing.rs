@@ -27,7 +27,7 @@ const LONGEST_M: f64 = 1e9;
 /// Bound of the error of the solver's upper bounds, relative to the lengths.
 const ROUNDING: f64 = 1e-12;
 
-/// The certificate as text with a digest that fits; none of a text that is no certificate otherwise.
+/// The certificate as text with a digest that fits; none of a text that is no certificate.
 pub fn sealed(text: &str) -> Option<String> {
     let mut certificate: Certificate = serde_json::from_str(text).ok()?;
     certificate.digest = certificate.computed_digest();
@@ -35,7 +35,8 @@ pub fn sealed(text: &str) -> Option<String> {
 }
 
 /// A certificate, with its own digest and with one that fits: refused with a reason, or the same
-/// after it was written. One that holds claims no more than the solver finds at samples of its path.
+/// after it was written. One that holds claims no more than the solver finds at samples of its
+/// path.
 pub fn certificate(text: &str) {
     if let Err(error) = Certificate::from_json(text) {
         assert!(!error.to_string().is_empty());

@@ -13,7 +13,8 @@ use crate::measure::overlap::Decision;
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use sublevel_core::measure::{Capsule, Decision, HalfSpace, Pose, overlap_of_capsule_with_half_space};
+/// use sublevel_core::measure::overlap_of_capsule_with_half_space;
+/// use sublevel_core::measure::{Capsule, Decision, HalfSpace, Pose};
 ///
 /// let (limb, floor) = (Capsule::new(0.1, 0.3)?, HalfSpace::new(Vector3::z(), 0.0)?);
 /// let at = |z| Pose::from_quaternion(Vector3::new(0.0, 0.0, z), [0.0, 0.0, 0.0, 1.0]);
@@ -33,7 +34,8 @@ pub fn overlap_of_capsule_with_half_space(capsule: &Capsule, pose: &Pose, half_s
 ///
 /// ```
 /// use nalgebra::Vector3;
-/// use sublevel_core::measure::{Capsule, Decision, HalfSpace, Pose, capsule_nearer_to_half_space_than};
+/// use sublevel_core::measure::capsule_nearer_to_half_space_than;
+/// use sublevel_core::measure::{Capsule, Decision, HalfSpace, Pose};
 ///
 /// let (limb, floor) = (Capsule::new(0.1, 0.3)?, HalfSpace::new(Vector3::z(), 0.0)?);
 /// let upright = Pose::from_quaternion(Vector3::new(0.0, 0.0, 1.0), [0.0, 0.0, 0.0, 1.0])?;
