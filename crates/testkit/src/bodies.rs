@@ -1,6 +1,6 @@
 //! The bodies of the catalogue: `E`, `Q2k`, `C2k`, `P2k`, `B`, cylinders, and fitted ones.
 
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, Matrix3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::sync::{Mutex, OnceLock};
@@ -13,20 +13,20 @@ pub type Placed<'a> = (&'a Body, &'a Pose);
 
 /// E: ellipsoid with these half-axes.
 pub fn e(x: f64, y: f64, z: f64) -> Body {
-    kept("E", [x, y, z], || Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)))
+    kept("E", &[x, y, z], || Body::ellipsoid("E", Vector3::zeros(), Vector3::new(x, y, z)))
 }
 
 /// Q2k: `(x/a)^degree + (y/b)^degree + (z/c)^degree <= 1`.
 pub fn q(degree: u8, x: f64, y: f64, z: f64) -> Body {
     let name = format!("Q{degree}");
-    kept(&name, [x, y, z], || Body::superellipsoid(&name, Vector3::zeros(), Vector3::new(x, y, z), degree))
+    kept(&name, &[x, y, z], || Body::superellipsoid(&name, Vector3::zeros(), Vector3::new(x, y, z), degree))
 }
 
 /// C2k: `((x² + y²)/r²)^k + (z/h)^2k <= 1`, degree 2k.
 pub fn c(degree: u8, radius: f64, half_height: f64) -> Body {
     let name = format!("C{degree}");
     let linear = Matrix3::from_diagonal(&Vector3::new(1.0 / radius, 1.0 / radius, 1.0 / half_height));
-    kept(&name, [radius, radius, half_height], || {
+    kept(&name, &[radius, radius, half_height], || {
         let constraint = known(&name, || rounded_cylinder(degree));
         Body::new(&name, Normalization { center: Vector3::zeros(), linear }, vec![constraint])
     })
@@ -75,7 +75,7 @@ fn rounded_cylinder(degree: u8) -> Constraint {
 pub fn p(degree: u8, size: f64) -> Body {
     let name = format!("P{degree}");
     let linear = Matrix3::identity() / size;
-    kept(&name, [size; 3], || {
+    kept(&name, &[size; 3], || {
         let constraint = known(&name, || octahedral_prism(degree));
         Body::new(&name, Normalization { center: Vector3::zeros(), linear }, vec![constraint])
     })
@@ -116,7 +116,7 @@ fn octahedral_prism(degree: u8) -> Constraint {
 
 /// Q6 that slabs across x and z cut, at 0.8 and 0.6 of its half-axes: three constraints.
 pub fn cut(x: f64, y: f64, z: f64) -> Body {
-    kept("cut Q6", [x, y, z], || {
+    kept("cut Q6", &[x, y, z], || {
         let whole = q(6, x, y, z);
         let slab = |axis: u8, half: f64| {
             known(&format!("slab {axis} {half}"), || {
@@ -133,21 +133,47 @@ pub fn cut(x: f64, y: f64, z: f64) -> Body {
 
 /// B: box with these half-extents.
 pub fn b(x: f64, y: f64, z: f64) -> Body {
-    kept("B", [x, y, z], || Body::cuboid("B", Vector3::new(x, y, z)))
+    kept("B", &[x, y, z], || Body::cuboid("B", Vector3::new(x, y, z)))
 }
 
 pub fn cylinder(radius: f64, half_height: f64) -> Body {
-    Body::cylinder("cylinder", radius, half_height).unwrap()
+    kept("cylinder", &[radius, half_height], || Body::cylinder("cylinder", radius, half_height))
 }
 
-/// The body of that name and these sizes, made once: cases share them, and proofs take their time.
-fn kept<E: Debug>(name: &str, sizes: [f64; 3], make: impl FnOnce() -> Result<Body, E>) -> Body {
-    static KEPT: Mutex<BTreeMap<(String, [u64; 3]), Body>> = Mutex::new(BTreeMap::new());
-    let key = (name.to_owned(), sizes.map(f64::to_bits));
+/// A body turned and moved within its frame, metres.
+pub fn moved(body: &Body, turn: &UnitQuaternion<f64>, shift: &Vector3<f64>) -> Body {
+    let numbers: Vec<f64> = turn.coords.iter().chain(shift).copied().collect();
+    kept(&body.id().to_string(), &numbers, || body.moved(turn, shift))
+}
+
+/// The body of these half sizes, metres, with the constraints of one of unit sizes about its
+/// origin, turned and moved within its frame: what [`Body::moved`] makes of one that is not made here.
+pub fn placed(unit: &Body, sizes: [f64; 3], turn: &UnitQuaternion<f64>, shift: &Vector3<f64>) -> Body {
+    let numbers: Vec<f64> = sizes.iter().chain(turn.coords.iter()).chain(shift).copied().collect();
+    kept(&format!("{} placed", unit.name()), &numbers, || {
+        let linear = Matrix3::from_diagonal(&Vector3::from(sizes.map(|size| 1.0 / size)));
+        let linear = linear * turn.to_rotation_matrix().inverse().matrix();
+        Body::new(unit.name(), Normalization { center: *shift, linear }, unit.constraints().to_vec())
+    })
+}
+
+/// Bodies of a process that are kept at most. Those of sizes that are drawn at random are asked for
+/// again soon or never; long runs draw 1e5 of them.
+const MOST_KEPT: usize = 1000;
+
+/// The body of that name and these numbers, made once: cases share them, and proofs take their
+/// time.
+fn kept<E: Debug>(name: &str, numbers: &[f64], make: impl FnOnce() -> Result<Body, E>) -> Body {
+    static KEPT: Mutex<BTreeMap<(String, Vec<u64>), Body>> = Mutex::new(BTreeMap::new());
+    let key = (name.to_owned(), numbers.iter().map(|number| number.to_bits()).collect());
     let found = KEPT.lock().expect("nothing fails in here").get(&key).cloned();
     found.unwrap_or_else(|| {
         let body = make().expect("a body of the catalogue");
-        KEPT.lock().expect("nothing fails in here").insert(key, body.clone());
+        let mut kept = KEPT.lock().expect("nothing fails in here");
+        if kept.len() >= MOST_KEPT {
+            kept.clear();
+        }
+        kept.insert(key, body.clone());
         body
     })
 }
@@ -268,6 +294,26 @@ pub fn zoo() -> Vec<Body> {
 fn every_kind_can_be_built() {
     for body in zoo() {
         println!("{} degree {} radius {}", body.name(), body.degree(), body.circumscribed().radius);
+    }
+}
+
+#[test]
+fn placed_bodies_are_those_that_are_moved() {
+    let mut random = crate::random::Seeded(2);
+    for _ in 0..5 {
+        let [x, y, z] = [(); 3].map(|()| random.between(0.3, 3.0));
+        let (turn, shift) = (random.rotation(), random.unit());
+        for (unit, sizes, body) in [
+            (e(1.0, 1.0, 1.0), [x, y, z], e(x, y, z)),
+            (b(1.0, 1.0, 1.0), [x, y, z], b(x, y, z)),
+            (cylinder(1.0, 1.0), [x, x, z], cylinder(x, z)),
+            (cut(1.0, 1.0, 1.0), [x, y, z], cut(x, y, z)),
+        ] {
+            let [made, expected] = [placed(&unit, sizes, &turn, &shift), moved(&body, &turn, &shift)];
+            assert_eq!((made.name(), made.id()), (expected.name(), expected.id()));
+            assert_eq!(made.interior_point(), expected.interior_point(), "{}", made.name());
+            assert!(made.boundary() == expected.boundary(), "{}", made.name());
+        }
     }
 }
 

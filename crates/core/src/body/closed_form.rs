@@ -285,12 +285,17 @@ mod tests {
             Body::cylinder("can", 0.3, 0.9).unwrap(),
             Body::ball("ball", Vector3::new(1.0, 2.0, 3.0), 0.25).unwrap(),
         ];
+        // 50 of each, turned and moved.
+        let moved: Vec<Body> = (0..150)
+            .map(|index| {
+                let mut random = Seeded(10_000 + index);
+                let rotation = random.rotation();
+                shapes[(index % 3) as usize].moved(&rotation, &random.unit()).unwrap()
+            })
+            .collect();
         for seed in 0..3000 {
             let mut random = Seeded(seed);
-            let q = nalgebra::Vector4::from_fn(|_, _| random.signed()).normalize();
-            let rotation = UnitQuaternion::new_normalize(nalgebra::Quaternion::from(q));
-            let body = &shapes[(seed % 3) as usize];
-            let body = if seed % 2 == 0 { body.clone() } else { body.moved(&rotation, &random.unit()).unwrap() };
+            let body = if seed % 2 == 0 { &shapes[(seed % 3) as usize] } else { &moved[random.index(moved.len())] };
             let form = body.closed_form().expect("a shape");
             let axis = form.axes().map_or(Vector3::x(), |axes| axes.column(0).into());
             let n = match seed % 5 {

@@ -222,7 +222,7 @@ impl<'a> Projection<'a> {
             *warm = WarmStart::default();
             match offset_of_point((form, &self.pose), point) {
                 PointSide::Inside => return Projected::inside(point, 0),
-                PointSide::Outside(PointOffset { lower, upper, normal, witness }) => {
+                PointSide::Outside(PointOffset { lower, upper, normal, witness, .. }) => {
                     let nearest = *point;
                     return Projected { lower, upper, plane: normal, normal, witness, nearest, iterations: 0 };
                 }

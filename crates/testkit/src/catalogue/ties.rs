@@ -1,7 +1,7 @@
 //! Where gradients jump: 21.
 
 use super::Draws;
-use crate::bodies::{b, e, q};
+use crate::bodies::{b, e, moved, q};
 use crate::random::pose;
 use nalgebra::{UnitQuaternion, Vector3};
 use sublevel_core::body::{Body, Compound};
@@ -70,7 +70,7 @@ pub fn any_parts(random: &mut dyn Draws) -> Parts {
 
 /// The body turned, and moved along x by this, metres.
 fn beside(body: &Body, turn: &UnitQuaternion<f64>, side: f64) -> Body {
-    body.moved(turn, &Vector3::new(side, 0.0, 0.0)).expect("finite")
+    moved(body, turn, &Vector3::new(side, 0.0, 0.0))
 }
 
 impl Parts {

@@ -106,26 +106,39 @@ mod tests {
     /// that the rounding of all of these is larger than what a table of heights adds.
     #[test]
     fn planes_bound_the_distance_far_from_the_origins() {
-        let zoos: Vec<_> = (0..6).map(|seed| zoo(&mut Seeded(seed))).collect();
+        let away = |is_far: bool, random: &mut Seeded| {
+            random.unit() * if is_far { 10_f64.powf(5.0 + random.signed()) } else { 0.0 }
+        };
+        // Each where it is, and at five places far away.
+        let bodies: Vec<[(Vector3<f64>, Body); 6]> = (0..6)
+            .flat_map(|seed| zoo(&mut Seeded(seed)))
+            .zip(60_000..)
+            .map(|(body, seed)| {
+                let mut random = Seeded(seed);
+                std::array::from_fn(|place| {
+                    let by = away(place > 0, &mut random);
+                    (by, body.moved(&UnitQuaternion::identity(), &by).expect("a body"))
+                })
+            })
+            .collect();
         let mut count = 0;
         for seed in 0..1200 {
             let mut random = Seeded(59_000 + seed);
-            let bodies = &zoos[(seed % 6) as usize];
-            let (a, b) =
-                (&bodies[random.next() as usize % bodies.len()], &bodies[random.next() as usize % bodies.len()]);
+            let mut draw = |is_far: bool| {
+                let places = &bodies[random.index(bodies.len())];
+                &places[if is_far { 1 + random.index(5) } else { 0 }]
+            };
+            let ((of_a, a), (of_b, b)) = (draw(seed % 2 == 0), draw(seed / 2 % 2 == 0));
+            let of_both = away(seed / 4 % 2 == 0, &mut random);
             let reach = a.circumscribed().radius + b.circumscribed().radius;
-            let mut away = |is_far: bool| random.unit() * if is_far { 10_f64.powf(5.0 + random.signed()) } else { 0.0 };
-            let (of_a, of_b, of_both) = (away(seed % 2 == 0), away(seed / 2 % 2 == 0), away(seed / 4 % 2 == 0));
-            let moved = |body: &Body, by| body.moved(&UnitQuaternion::identity(), &by).expect("a body");
-            let (a, b) = (moved(a, of_a), moved(b, of_b));
             // Where the bodies are a few reaches from each other.
             let turned = [random_pose(&mut random, 0.0), random_pose(&mut random, 0.0)];
             let centers = [of_both, of_both + random.unit() * (reach * 3_f64.powf(random.signed()))];
-            let place = |turned: &Pose, of_body: Vector3<f64>, center: Vector3<f64>| {
-                turned.with_translation(center - turned.transform_direction(&of_body))
+            let place = |turned: &Pose, of_body: &Vector3<f64>, center: Vector3<f64>| {
+                turned.with_translation(center - turned.transform_direction(of_body))
             };
             let (pose_a, pose_b) = (place(&turned[0], of_a, centers[0]), place(&turned[1], of_b, centers[1]));
-            count += u32::from(bounded((&a, &pose_a), (&b, &pose_b), &mut random, seed).is_some());
+            count += u32::from(bounded((a, &pose_a), (b, &pose_b), &mut random, seed).is_some());
         }
         assert!(count > 400, "{count}");
     }

@@ -203,23 +203,24 @@ fn rays_begin_and_end() {
 
 #[test]
 fn the_first_part_counts() {
-    for seed in 0..100 {
+    let part = Body::superellipsoid("q", Vector3::zeros(), Vector3::new(0.5, 1.0, 1.5), 4).unwrap();
+    let new_compound = |seed: u64| {
         let mut random = Seeded(seed);
-        let parts: Vec<Body> = (0..4)
-            .map(|_| {
-                let shift = Vector3::from_fn(|_, _| 3.0 * random.signed());
-                let turn = UnitQuaternion::from_euler_angles(random.signed(), random.signed(), random.signed());
-                Body::superellipsoid("q", Vector3::zeros(), Vector3::new(0.5, 1.0, 1.5), 4)
-                    .unwrap()
-                    .moved(&turn, &shift)
-                    .unwrap()
-            })
-            .collect();
-        let compound = Compound::new("c", parts).unwrap();
+        let parts = (0..4).map(|_| {
+            let shift = Vector3::from_fn(|_, _| 3.0 * random.signed());
+            let turn = UnitQuaternion::from_euler_angles(random.signed(), random.signed(), random.signed());
+            part.moved(&turn, &shift).unwrap()
+        });
+        Compound::new("c", parts.collect()).unwrap()
+    };
+    let compounds: Vec<Compound> = (0..20).map(new_compound).collect();
+    for seed in 0..100 {
+        let mut random = Seeded(1000 + seed);
+        let compound = &compounds[(seed % 20) as usize];
         let pose = random_pose(&mut random, 2.0);
         let origin = pose.translation() + random.unit() * 10.0;
         let ray = Ray::new(origin, pose.translation() - origin + random.unit(), f64::INFINITY).unwrap();
-        let found = cast(&compound, &pose, &ray);
+        let found = cast(compound, &pose, &ray);
         let first = compound.parts().iter().filter_map(|part| cast(part, &pose, &ray).hit().copied());
         let first = first.min_by(|a, b| a.upper.total_cmp(&b.upper));
         match (found, first) {

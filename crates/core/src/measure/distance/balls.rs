@@ -1,11 +1,13 @@
-//! The distance of two balls.
+//! The distance of a ball from a ball, a box or a cylinder.
 
 use super::answer::Distance;
 use crate::body::ClosedForm;
 use crate::measure::bounds::culling::across;
-use crate::measure::frames::pose::Pose;
+use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::exact_shape::{PointOffset, PointSide, active, offset_of_vector};
+use crate::measure::solver::tangent_newton::ALIGNED;
 use crate::measure::status::Status;
 
 /// Rounding of sums of lengths, relative to their magnitudes; dimensionless. Eight operations of
@@ -51,5 +53,61 @@ pub(super) fn of_balls(
         parts: [0, 0],
         tied: false,
         iterations: 0,
+    })
+}
+
+/// The distance of a ball from a shape that is none, whichever comes first: that of its centre less
+/// the radius. None of others, at contact within rounding, and where rounding leaves the bracket
+/// wider than asked for or the normal uncertain.
+#[inline(always)]
+pub(super) fn of_ball_beside(
+    (form_a, pose_a): (&ClosedForm, &Pose),
+    (form_b, pose_b): (&ClosedForm, &Pose),
+    options: &Options<'_>,
+) -> Option<Distance> {
+    let (swapped, radius, (ball, pose), (form, form_pose)) =
+        match (form_a.shape().ball_radius_m(), form_b.shape().ball_radius_m()) {
+            (Some(radius), None) => (false, radius, (form_a, pose_a), (form_b, pose_b)),
+            (None, Some(radius)) => (true, radius, (form_b, pose_b), (form_a, pose_a)),
+            _ => return None,
+        };
+    if options.exhausted(0) {
+        return None;
+    }
+    let (offset, arm) = (pose.translation() - form_pose.translation(), pose.transform_direction(ball.center()));
+    let error = RELATIVE_ERROR * (offset.norm() + ball.center().norm()) + ball.displacement_m();
+    let common = |witness| Distance {
+        status: Status::Converged,
+        upper: 0.0,
+        witness_a: witness,
+        witness_b: witness,
+        ..Distance::default()
+    };
+    let center = pose.translation() + arm;
+    let PointOffset { lower, upper, normal, own_normal, witness } =
+        match offset_of_vector((form, form_pose), &(offset + arm), error) {
+            PointSide::Inside => return Some(common(center)),
+            PointSide::Outside(found) => found,
+            PointSide::Open => return None,
+        };
+    let rounding = ROUNDING * (upper + radius);
+    let (gap, most) = (lower - radius - rounding, upper - radius + rounding);
+    if most < 0.0 {
+        return Some(common(witness));
+    }
+    // A normal at an edge is off by what places are, over the distance.
+    let is_aligned = upper - lower <= ALIGNED * lower;
+    if !(gap > 0.0 && is_aligned && most - gap <= options.accuracy() * radius.min(form.reach_m())) {
+        return None;
+    }
+    let on_ball = center - normal * radius;
+    let (of_ball, of_form) = (ActiveConstraints::single(0, 0.5 * radius), active(form.shape(), own_normal));
+    let found = Distance { status: Status::Converged, lower: gap, upper: most, ..Distance::default() };
+    Some(if swapped {
+        let (active_a, active_b) = (of_form, of_ball);
+        Distance { witness_a: witness, witness_b: on_ball, normal: Some(-normal), active_a, active_b, ..found }
+    } else {
+        let (active_a, active_b) = (of_ball, of_form);
+        Distance { witness_a: on_ball, witness_b: witness, normal: Some(normal), active_a, active_b, ..found }
     })
 }

@@ -2,7 +2,7 @@
 //! another with a closed form.
 
 use super::answer::Distance;
-use super::balls::of_balls;
+use super::balls::{of_ball_beside, of_balls};
 use crate::body::{Body, ClosedForm};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::V3;
@@ -231,13 +231,14 @@ pub(super) fn of_shapes(
     warm: &mut WarmStart,
 ) -> Option<Result<Distance, u32>> {
     let (form_a, form_b) = (a.closed_form()?, b.closed_form()?);
-    if let Some(found) = of_balls((form_a, pose_a), (form_b, pose_b), options) {
+    let (of_a, of_b) = ((form_a, pose_a), (form_b, pose_b));
+    if let Some(found) = of_balls(of_a, of_b, options).or_else(|| of_ball_beside(of_a, of_b, options)) {
         *warm = Hint::Shapes { x_a: *form_a.center() }.into();
         return Some(Ok(found));
     }
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose_a.transform_point(x_a)) } else { None };
-    let found = match between_shapes((form_a, pose_a), (form_b, pose_b), start.as_ref(), goal, (tolerance, options)) {
+    let found = match between_shapes(of_a, of_b, start.as_ref(), goal, (tolerance, options)) {
         Ok(found) => found,
         Err(steps) => return Some(Err(steps)),
     };

@@ -2,14 +2,13 @@
 //! then the general search.
 
 use super::answer::Distance;
-use super::balls::of_balls;
 use super::edges::of_edges;
 use super::exact::{Exact, of_shapes};
 use super::planes::lower_by_planes;
 use super::query::Query;
 use super::search::Search;
-use crate::body::Body;
-use crate::measure::bounds::culling::{BallBounds, ball_gap, balls};
+use crate::body::{Body, ClosedForm};
+use crate::measure::bounds::culling::{BallBounds, balls};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::vector::V3;
@@ -29,7 +28,7 @@ use crate::polynomial::{Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
 
 /// Distance of two bodies as far as the goal needs it, cheapest bounds first. `warm` stays as it is
-/// when they suffice.
+/// when bounds suffice.
 #[inline]
 pub(in crate::measure) fn settle(
     of_a: (&Body, &Pose),
@@ -38,24 +37,12 @@ pub(in crate::measure) fn settle(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    if goal.is_narrow() {
+    // A ball's distance from a shape costs no more than bounds of it.
+    let forms = [of_a, of_b].map(|(body, _)| body.closed_form());
+    let is_ball = |form: &Option<&ClosedForm>| form.is_some_and(|form| form.shape().ball_radius_m().is_some());
+    let is_beside_ball = forms.iter().all(Option::is_some) && forms.iter().any(is_ball);
+    if goal.is_narrow() || is_beside_ball && runs(Stage::ClosedForm) {
         return between(of_a, of_b, goal, options, warm);
-    }
-    if runs(Stage::ClosedForm)
-        && let (Some(form_a), Some(form_b)) = (of_a.0.closed_form(), of_b.0.closed_form())
-    {
-        if let Some(found) = of_balls((form_a, of_a.1), (form_b, of_b.1), options) {
-            return found;
-        }
-        // The projection of a ball's centre costs no more than a plane.
-        if [form_a, form_b].iter().any(|form| form.shape().ball_radius_m().is_some()) {
-            let lower = if runs(Stage::Balls) { ball_gap(of_a, of_b).max(0.0) } else { 0.0 };
-            return if goal.met(lower, f64::INFINITY) {
-                parted(lower, 0)
-            } else {
-                between(of_a, of_b, goal, options, warm)
-            };
-        }
     }
     let BallBounds { lower, upper, witness_a, witness_b, normal } = balls(of_a, of_b);
     let mut bound = Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() };

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::body::Body;
-use crate::measure::tests::{at, random_pose, zoo};
+use crate::measure::tests::{at, powers, random_pose, zoo};
 use crate::measure::warm::Hint;
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
@@ -48,23 +48,27 @@ fn ball_pairs_and_other_centers() {
 
 #[test]
 fn coaxial_powers_and_boxes_have_closed_forms() {
+    let powers = powers();
+    let mut random = Seeded(0);
+    let mut cuboid = || {
+        let half = Vector3::from_fn(|_, _| 10_f64.powf(random.signed()));
+        (half, Body::cuboid("box", half).unwrap())
+    };
+    let boxes: Vec<_> = (0..40).map(|_| cuboid()).collect();
     for seed in 0..320 {
         let mut random = Seeded(seed);
-        let degrees = [2_u8, 4, 6, 8];
-        let (ka, kb) = (degrees[(seed % 4) as usize], degrees[(seed / 4 % 4) as usize]);
-        let half = |random: &mut Seeded| Vector3::from_fn(|_, _| 10_f64.powf(random.signed()));
-        let (ha, hb) = (half(&mut random), half(&mut random));
-        let boxes = seed % 5 == 0;
-        let make = |half: Vector3<f64>, degree: u8| {
-            if boxes { Body::cuboid("box", half) } else { Body::superellipsoid("q", Vector3::zeros(), half, degree) }
+        let mut draw = |degree: u64| {
+            let of = if seed % 5 == 0 { &boxes } else { &powers[degree as usize] };
+            &of[random.index(of.len())]
         };
-        let (a, b) = (make(ha, ka).unwrap(), make(hb, kb).unwrap());
+        let ((ha, a), (hb, b)) = (draw(seed % 4), draw(seed / 4 % 4));
         let axis = (seed / 16 % 3) as usize;
         let truth = [1e-9, 1e-3, 0.5, 1.0, 1.0 + 1e-9, 3.0, 1e4][(seed % 7) as usize];
         let mut shift = Vector3::zeros();
         shift[axis] = truth * (ha[axis] + hb[axis]) * if seed % 2 == 0 { 1.0 } else { -1.0 };
-        let answer = cold(&a, &Pose::identity(), &b, &at(shift.x, shift.y, shift.z));
-        let label = format!("seed {seed} ({ka}, {kb}), boxes {boxes}, s {truth:e}: {answer:?}");
+        let answer = cold(a, &Pose::identity(), b, &at(shift.x, shift.y, shift.z));
+        let kinds = [a, b].map(|body| (body.name(), body.degree()));
+        let label = format!("seed {seed}, {kinds:?}, s {truth:e}: {answer:?}");
         assert_eq!(answer.status, Status::Converged, "{label}");
         assert!(answer.lower <= truth * (1.0 + 1e-15) && truth * (1.0 - 1e-15) <= answer.upper, "{label}");
         assert!(answer.upper - answer.lower <= 1e-9 * truth.max(1.0), "{label}");
@@ -72,12 +76,10 @@ fn coaxial_powers_and_boxes_have_closed_forms() {
     // Boxes about their centres, anywhere: the largest of the three ratios.
     for seed in 0..200 {
         let mut random = Seeded(seed);
-        let half = |random: &mut Seeded| Vector3::from_fn(|_, _| 10_f64.powf(random.signed()));
-        let (ha, hb) = (half(&mut random), half(&mut random));
+        let [(ha, a), (hb, b)] = [(); 2].map(|()| &boxes[random.index(boxes.len())]);
         let shift = random.unit() * 10_f64.powf(random.signed());
         let truth = shift.abs().component_div(&(ha + hb)).max();
-        let (a, b) = (Body::cuboid("a", ha).unwrap(), Body::cuboid("b", hb).unwrap());
-        let answer = cold(&a, &Pose::identity(), &b, &at(shift.x, shift.y, shift.z));
+        let answer = cold(a, &Pose::identity(), b, &at(shift.x, shift.y, shift.z));
         let label = format!("seed {seed}, s {truth:e}: {answer:?}");
         assert_eq!(answer.status, Status::Converged, "{label}");
         assert!(answer.lower <= truth * (1.0 + 4e-16) && truth * (1.0 - 4e-16) <= answer.upper, "{label}");

@@ -6,7 +6,8 @@
 //! the distance with a distance of either sign, so Newton's method passes through contact without
 //! noticing; x and y trade places along n. What differs is the proof: apart, any pair of points
 //! bounds it from above; in overlap that takes all directions ([`crate::measure::penetration`]). Of
-//! balls beside balls, boxes and cylinders, and of boxes, it has a closed form.
+//! balls beside balls, boxes and cylinders, of boxes, of boxes and cylinders, and of parallel
+//! cylinders, it has a closed form.
 
 mod answer;
 mod closed_form;

@@ -44,7 +44,7 @@ pub enum Stage {
     DirectionSampling,
     /// Search around a direction for a better one, where edges stop Newton's method.
     CompassSearch,
-    /// Support points by Newton's method with one active constraint, several at once or one.
+    /// Support points by Newton's method, several at once or one.
     SupportLanes,
     /// The distances of single points of a capsule's axis.
     AlongAxis,

@@ -69,11 +69,11 @@ fn the_closest_parts_count() {
 #[test]
 fn few_pairs_of_many_parts_are_searched() {
     let (mut searched, mut queries) = (0, 0);
+    let egg = Body::ellipsoid("part", Vector3::zeros(), Vector3::new(0.9, 0.25, 0.2)).unwrap();
     for seed in 0..12 {
         let mut random = Seeded(7_000 + seed);
         let mut heap = || {
             let mut part = || {
-                let egg = Body::ellipsoid("part", Vector3::zeros(), Vector3::new(0.9, 0.25, 0.2)).unwrap();
                 let turn = UnitQuaternion::from_scaled_axis(random.unit() * 3.0);
                 egg.moved(&turn, &Vector3::from_fn(|_, _| 1.2 * random.signed())).unwrap()
             };
@@ -292,8 +292,8 @@ fn parts_of(tree: &PartTree, node: usize) -> Vec<usize> {
 /// them.
 fn cloud(random: &mut Seeded, count: usize) -> Compound {
     let size = (count as f64).cbrt().recip();
+    let egg = Body::ellipsoid("part", Vector3::zeros(), Vector3::new(0.9, 0.35, 0.3) * size).unwrap();
     let mut part = || {
-        let egg = Body::ellipsoid("part", Vector3::zeros(), Vector3::new(0.9, 0.35, 0.3) * size).unwrap();
         let turn = UnitQuaternion::from_scaled_axis(random.unit() * 3.0);
         egg.moved(&turn, &Vector3::from_fn(|_, _| random.signed())).unwrap()
     };

@@ -98,10 +98,10 @@ fn smooth_bodies_against_shapes() {
 }
 
 /// Needles and plates of aspects from 10 to 100, whose nearest point crosses a whole side while the
-/// normal hardly turns.
+/// normal hardly turns: pairs of 200 of them and 200 shapes.
 #[test]
 fn thin_bodies_against_shapes() {
-    let share = share("thin bodies against shapes", 900, |random| {
+    let new_thin = |random: &mut Seeded| {
         let thick = 10_f64.powf(-1.5 + 0.5 * random.signed());
         let long = 2_f64.powf(random.signed());
         let half = if random.next().is_multiple_of(2) {
@@ -110,13 +110,11 @@ fn thin_bodies_against_shapes() {
             [long * thick, long * thick, long]
         };
         let degree = [2, 4, 6, 8][random.next() as usize % 4];
-        let thin = if degree == 2 {
-            Body::ellipsoid("thin", random.unit() * 0.3, half.into()).unwrap()
-        } else {
-            Body::superellipsoid("thin", random.unit() * 0.3, half.into(), degree).unwrap()
-        };
-        (thin, shape(random))
-    });
+        Body::superellipsoid("thin", random.unit() * 0.3, half.into(), degree).unwrap()
+    };
+    let thin: Vec<Body> = (0..200).map(|index| new_thin(&mut Seeded(62_000 + index))).collect();
+    let share =
+        share("thin bodies against shapes", 900, |random| (thin[random.index(thin.len())].clone(), shape(random)));
     assert!(share > 85.0, "{share}");
 }
 
@@ -180,12 +178,14 @@ fn shapes_against_shapes() {
 
 #[test]
 fn balls_against_balls_and_shapes() {
-    let ball = |random: &mut Seeded| {
+    let new_ball = |random: &mut Seeded| {
         let ball = Body::ball("ball", random.unit() * 0.7, 10_f64.powf(random.signed() - 0.5)).unwrap();
         // Turned, rounding leaves it axes of its own.
         let rotation = UnitQuaternion::from_scaled_axis(random.unit() * 2.0);
         if random.next().is_multiple_of(2) { ball } else { ball.moved(&rotation, &(random.unit() * 0.7)).unwrap() }
     };
+    let balls: Vec<Body> = (0..200).map(|index| new_ball(&mut Seeded(64_000 + index))).collect();
+    let ball = |random: &mut Seeded| balls[random.index(balls.len())].clone();
     let share = share("balls against balls and shapes", 900, |random| {
         let other = if random.next().is_multiple_of(2) { ball(random) } else { shape(random) };
         (ball(random), other)
@@ -194,27 +194,32 @@ fn balls_against_balls_and_shapes() {
 }
 
 /// The formula for two balls near and far from each other and from the origin, against exact
-/// differences of their centres.
+/// differences of their centres: ten placements of each pair.
 #[test]
 fn two_balls_have_a_formula() {
-    for seed in 0..2000 {
-        let mut random = Seeded(74_000 + seed);
+    let new_pair = |index: u64| {
+        let mut random = Seeded(65_000 + index);
         let scale = 10_f64.powf(4.0 * random.signed());
         let radii = [0, 1].map(|_| scale * 10_f64.powf(random.signed()));
         let offsets = [0, 1].map(|_| random.unit() * scale);
-        let [a, b] = [0, 1].map(|k| Body::ball("ball", offsets[k], radii[k]).unwrap());
+        (scale, radii, offsets, [0, 1].map(|k| Body::ball("ball", offsets[k], radii[k]).unwrap()))
+    };
+    let pairs: Vec<_> = (0..200).map(new_pair).collect();
+    for seed in 0..2000 {
+        let mut random = Seeded(74_000 + seed);
+        let (scale, radii, offsets, [a, b]) = &pairs[(seed % 200) as usize];
         // Centres on a grid of powers of two, whose difference and its length are exact.
         let grid = scale.log2().round().exp2();
         let origin = Vector3::from_fn(|_, _| (random.signed() * 1e6).round() * grid);
         let way = Vector3::new(3.0, 4.0, 12.0) * grid * 2_f64.powi((random.next() % 8) as i32 - 2);
         let [pose_a, pose_b] = [origin + way, origin].map(|t| Pose::identity().with_translation(t));
         // The centres are off the origins of the frames, by what cancels out but for rounding.
-        let [pose_a, pose_b] = [(pose_a, offsets[0]), (pose_b, offsets[1])].map(|(pose, offset)| {
+        let [pose_a, pose_b] = [(pose_a, &offsets[0]), (pose_b, &offsets[1])].map(|(pose, offset)| {
             let turned = random_pose(&mut random, 0.0);
-            turned.with_translation(pose.translation() - turned.transform_direction(&offset))
+            turned.with_translation(pose.translation() - turned.transform_direction(offset))
         });
         let truth = (13.0 / 12.0 * way.z - radii[0] - radii[1]).max(0.0);
-        let found = distance(&a, &pose_a, &b, &pose_b, &Options::default(), &mut WarmStart::default());
+        let found = distance(a, &pose_a, b, &pose_b, &Options::default(), &mut WarmStart::default());
         let label = format!("seed {seed}: {found:?} against {truth}");
         assert_eq!(found.status, Status::Converged, "{label}");
         // So much the translations were rounded by.
@@ -267,13 +272,13 @@ fn boxes_side_by_side() {
 /// Shapes that overlap are nearer than any threshold, by their closed forms alone.
 #[test]
 fn thresholds_of_overlapping_shapes_are_decided() {
+    let shapes = [
+        Body::cuboid("box", Vector3::new(0.5, 0.3, 0.4)).unwrap(),
+        Body::cylinder("can", 0.4, 0.3).unwrap(),
+        Body::ball("ball", Vector3::zeros(), 0.3).unwrap(),
+    ];
     for seed in 0..200 {
         let mut random = Seeded(74_000 + seed);
-        let shapes = [
-            Body::cuboid("box", Vector3::new(0.5, 0.3, 0.4)).unwrap(),
-            Body::cylinder("can", 0.4, 0.3).unwrap(),
-            Body::ball("ball", Vector3::zeros(), 0.3).unwrap(),
-        ];
         let (a, b) = (&shapes[random.next() as usize % 3], &shapes[random.next() as usize % 3]);
         let (pose_a, pose_b) = (random_pose(&mut random, 0.2), random_pose(&mut random, 0.2));
         let decided = only(&[Stage::ClosedForm], || {
@@ -323,7 +328,7 @@ fn smooth_bodies_over_shapes_are_settled_alone() {
     let (mut solved, count) = (0, 960);
     for seed in 0..count {
         let mut random = Seeded(76_000 + seed);
-        let (a, b) = (smooth[random.next() as usize % smooth.len()].clone(), new_shape(&mut random));
+        let (a, b) = (smooth[random.next() as usize % smooth.len()].clone(), shape(&mut random));
         let size = a.circumscribed().radius.min(b.circumscribed().radius);
         let pose_a = random_pose(&mut random, 1.0);
         let pose_b = at_gap(&a, &pose_a, &b, gaps[(seed % 8) as usize] * size, &mut random);
@@ -368,8 +373,7 @@ fn smooth_bodies_over_shapes_are_settled_alone() {
 /// curvatures there are exactly 0.
 #[test]
 fn bricks_and_cans_on_a_table_are_settled_alone() {
-    let (mut solved, count) = (0, 480);
-    for seed in 0..count {
+    let new_pair = |seed: u64| {
         let mut random = Seeded(77_000 + seed);
         let mut size = || 0.2 * 4_f64.powf(random.signed());
         let half = Vector3::new(size(), size(), size());
@@ -378,11 +382,19 @@ fn bricks_and_cans_on_a_table_are_settled_alone() {
             degree => Body::superellipsoid("a", Vector3::zeros(), half, 2 + 2 * degree as u8).unwrap(),
         };
         let half = Vector3::new(size(), size(), size());
-        let b = if seed / 4 % 2 == 0 {
+        let b = if (seed / 4).is_multiple_of(2) {
             Body::cuboid("box", half).unwrap()
         } else {
             Body::cylinder("can", half.x, half.z).unwrap()
         };
+        (a, b)
+    };
+    // An odd multiple of 8: each of the pairs is put to both heights.
+    let pairs: Vec<(Body, Body)> = (0..168).map(new_pair).collect();
+    let (mut solved, count) = (0, 480);
+    for seed in 0..count {
+        let mut random = Seeded(78_000 + seed);
+        let (a, b) = &pairs[(seed % 168) as usize];
         let yaw = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), 3.0 * random.signed());
         let far = (a.circumscribed().radius + b.circumscribed().radius) * 2_f64.powf(random.signed());
         let height = if seed / 8 % 2 == 0 { 0.0 } else { 0.05 };
@@ -391,7 +403,7 @@ fn bricks_and_cans_on_a_table_are_settled_alone() {
         let pose_b = Pose::from_quaternion(place, yaw.coords.into()).unwrap();
         let ask = || {
             let warm = &mut WarmStart::default();
-            level_distance(&a, &Pose::identity(), &b, &pose_b, &Options::default(), warm)
+            level_distance(a, &Pose::identity(), b, &pose_b, &Options::default(), warm)
         };
         let (truth, found) = (except(&[Stage::ClosedForm], ask), only(&[Stage::ClosedForm], ask));
         let label = format!("seed {seed}: {found:?} against {truth:?}");

@@ -43,13 +43,16 @@ pub fn far_from_the_origin(index: u64, power: i32, random: &mut dyn Draws) -> [P
 
 /// Family 11. A pair as it is, and everything `s` times as large.
 pub fn units(index: u64, s: f64, seed: u64) -> [Pair; 2] {
-    [1.0, s].map(|s| {
-        let random = &mut Seeded(seed);
-        let shapes = shapes(index, [s, s], random);
-        let reach = 3.5 * random.positive();
-        let pair = somewhere(shapes, 0.5, reach, random, &format!("unit {s:e} m"));
-        pair.carried(|from| pose(from.translation() * s, from.rotation()))
-    })
+    [1.0, s].map(|s| in_unit(index, s, seed))
+}
+
+/// One of [`units`].
+pub fn in_unit(index: u64, s: f64, seed: u64) -> Pair {
+    let random = &mut Seeded(seed);
+    let shapes = shapes(index, [s, s], random);
+    let reach = 3.5 * random.positive();
+    let pair = somewhere(shapes, 0.5, reach, random, &format!("unit {s:e} m"));
+    pair.carried(|from| pose(from.translation() * s, from.rotation()))
 }
 
 /// Needles of family 12 and partners of each.

@@ -1,7 +1,7 @@
 //! Shapes and how they are drawn.
 
 use super::super::Draws;
-use crate::bodies::{b, c, cut, e, p, q};
+use crate::bodies::{b, c, cut, cylinder, e, moved, p, placed, q};
 use nalgebra::Vector3;
 use sublevel_core::body::Body;
 use sublevel_core::measure::{Capsule, HalfSpace, Pose};
@@ -58,22 +58,40 @@ impl Shape {
     /// One of the kind with sizes about this, metres, over one decade; of bodies but balls each
     /// second one stands off the origin of its frame, and turned.
     pub fn drawn(kind: Kind, size: f64, random: &mut dyn Draws) -> Self {
-        let is_moved = random.index(2) == 1;
-        match Self::centred(kind, size, random) {
-            // How deep a capsule is in a ball is known in its closed form, which 200 bits have of
-            // balls about the origin.
-            Self::Body(body) if is_moved && kind != Kind::Ball => {
-                let (turn, shift) = (random.rotation(), random.unit() * (0.5 * size));
-                Self::of_body(body.moved(&turn, &shift).expect("a body near its origin"))
-            }
-            shape => shape,
+        if random.index(2) == 0 {
+            return Self::centred(kind, size, random);
         }
+        let unit = match kind {
+            Kind::Ellipsoid => e(1.0, 1.0, 1.0),
+            Kind::Cuboid => b(1.0, 1.0, 1.0),
+            Kind::Cylinder => cylinder(1.0, 1.0),
+            Kind::Cut => cut(1.0, 1.0, 1.0),
+            _ => {
+                return match Self::centred(kind, size, random) {
+                    // How deep a capsule is in a ball is known in its closed form, which 200 bits
+                    // have of balls about the origin.
+                    Self::Body(body) if kind != Kind::Ball => {
+                        let (turn, shift) = (random.rotation(), random.unit() * (0.5 * size));
+                        Self::of_body(moved(&body, &turn, &shift))
+                    }
+                    shape => shape,
+                };
+            }
+        };
+        let [x, y, z] = Self::sizes(size, random);
+        let sizes = if kind == Kind::Cylinder { [x, x, z] } else { [x, y, z] };
+        let (turn, shift) = (random.rotation(), random.unit() * (0.5 * size));
+        Self::of_body(placed(&unit, sizes, &turn, &shift))
+    }
+
+    /// About this, metres, over one decade.
+    fn sizes(size: f64, random: &mut dyn Draws) -> [f64; 3] {
+        [(); 3].map(|()| random.between(0.3, 3.0) * size)
     }
 
     /// The same about the origin of its frame and along its axes.
     pub fn centred(kind: Kind, size: f64, random: &mut dyn Draws) -> Self {
-        let [x, y, z] = [(); 3].map(|()| random.between(0.3, 3.0));
-        let [x, y, z] = [x * size, y * size, z * size];
+        let sizes = Self::sizes(size, random);
         match kind {
             Kind::Smooth => Self::of_body(match random.index(6) {
                 0 => q(4, size, 0.5 * size, 0.7 * size),
@@ -83,7 +101,7 @@ impl Shape {
                 4 => c(4, size, 0.5 * size),
                 _ => c(8, 0.5 * size, size),
             }),
-            kind => Self::of_sizes(kind, [x, y, z]),
+            kind => Self::of_sizes(kind, sizes),
         }
     }
 
@@ -101,7 +119,7 @@ impl Shape {
             Kind::Ball => Self::of_body(e(x, x, x)),
             Kind::Ellipsoid => Self::of_body(e(x, y, z)),
             Kind::Cuboid => Self::of_body(b(x, y, z)),
-            Kind::Cylinder => Self::of_body(Body::cylinder("cylinder", x, z).expect("sizes are positive")),
+            Kind::Cylinder => Self::of_body(cylinder(x, z)),
             Kind::Capsule => capsule(x, z),
             Kind::Segment => capsule(0.0, z),
             Kind::Point => Self::Point,

@@ -3,7 +3,7 @@
 use super::quadratic_program::MOST_ACTIVE;
 use crate::body::{Body, ConstraintTrust, MAX_CONSTRAINTS};
 use crate::measure::frames::vector::{V3, add_scaled, dot};
-use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::active_constraints::{ActiveConstraints, ActiveSet};
 use crate::measure::solver::tangent_newton::Side;
 use crate::polynomial::{NEAR_LEVEL, NumberJet, Simd, ThirdCeiling};
 
@@ -93,6 +93,12 @@ impl Weighted {
             }
         }
         sum
+    }
+
+    /// Which have a weight.
+    #[inline(always)]
+    pub(super) fn set(&self) -> ActiveSet {
+        self.iter().filter(|(_, weight)| *weight > 0.0).fold(0, |set, (i, _)| set | 1 << i)
     }
 
     /// As answers report them: without those of no weight.

@@ -22,10 +22,12 @@
 //! is attained by points that are moved towards the bodies' interior points until all constraints
 //! are proven to hold.
 //!
-//! Beside a set with a closed form one body alone is linearized (`set_distance`).
+//! Beside a set with a closed form one body alone is linearized (`set_distance`), and likewise for
+//! how far it reaches (`farthest`).
 
 mod aggregate;
 mod distance;
+mod farthest;
 mod linearized;
 mod quadratic_program;
 mod set_distance;
@@ -33,4 +35,5 @@ mod share_inside;
 mod spot;
 
 pub(in crate::measure) use distance::{EdgeProven, EdgeQuery, EdgeTrace};
+pub(in crate::measure) use farthest::FarthestOfEdges;
 pub(in crate::measure) use set_distance::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart, EdgeShapeTrace};

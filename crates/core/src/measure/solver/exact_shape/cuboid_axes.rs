@@ -12,6 +12,12 @@ use crate::measure::frames::vector::{M3, V3, dot};
 use crate::polynomial::{Scalar, gamma};
 use nalgebra::Vector3;
 
+/// Largest angle, radians, between the normal of an answer and that of the solution.
+///
+/// Larger, gradients would be off by more than 1e-6; smaller, balls beside edges and boxes that
+/// touch are left to the general search. Exercised by `signed_shapes_have_gradients`.
+pub(super) const ALIGNED: f64 = 1e-7;
+
 /// Sine of the angle between two edges below which the axis across them is not the answer, and
 /// theirs does not count as a face that others may be beside: see [`CuboidAxes::least_overlap`].
 ///
@@ -53,11 +59,11 @@ pub(super) struct CuboidAxis {
     slim: f64,
 }
 
-/// By how much two boxes overlap along the axis along which they do least; negative if they are
+/// By how much two shapes overlap along the axis along which they do least; negative if they are
 /// apart. Metres.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LeastOverlap {
-    /// No translation shorter than this takes the boxes apart: proven.
+    /// No translation shorter than this takes the shapes apart: proven.
     pub(super) lower: f64,
     /// One along the normal of this length does: proven.
     pub(super) upper: f64,

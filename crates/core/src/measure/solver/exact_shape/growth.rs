@@ -7,11 +7,11 @@
 //! two boxes is a polytope, whose gauge is the largest over the axes across its faces.
 
 use super::beside::beside;
-use super::cuboid_axes::CuboidAxis;
+use super::cuboid_axes::{ALIGNED, CuboidAxis};
 use super::line::{Line, Target};
 use super::placed::direction_to_world;
 use super::shapes::{Placed, between_shapes};
-use super::signed::{ALIGNED, cuboid_axes};
+use super::signed::cuboid_axes;
 use crate::measure::bounds::culling::across;
 use crate::measure::frames::pose::RELATIVE_ERROR;
 use crate::measure::options::Options;

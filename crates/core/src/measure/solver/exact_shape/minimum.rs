@@ -92,12 +92,13 @@ impl LevelQuery<'_> {
     #[inline(always)]
     fn solve<S: Simd, P: Projectable>(&self, simd: S, relative: &Relative<f64>, set: P) -> Result<LevelMinimum, u32> {
         let side = Side::away(simd, self.body, 0, relative);
+        let middle = interior(simd, self.body, relative);
         let from = match self.from {
             Some(own) => {
                 let own = own - self.form.center();
                 self.form.axes().map_or(own, |axes| axes.tr_mul(&own)).into()
             }
-            None => interior(simd, self.body, relative),
+            None => middle,
         };
         let mut y = set.project(simd, from);
         let descent = Descent { set, side: &side };
@@ -111,7 +112,10 @@ impl LevelQuery<'_> {
             let gradient = side.gradient(simd, &jet);
             let (lower, upper) = self.bracket(simd, &descent, (&jet, inside), (y, gradient));
             let pull = scaled::<S, f64>(gradient, -1.0 / dot::<S, f64>(gradient, gradient).sqrt());
-            let is_aligned = set.slide(simd, y, pull) <= ALIGNED;
+            // The point is off by the slide times the way to where the polynomial is lowest.
+            let way = subtract::<S, f64>(y, middle);
+            let far = dot::<S, f64>(way, way).sqrt().max(set.reach());
+            let is_aligned = set.slide(simd, y, pull) <= (ALIGNED * set.reach() / far).max(4.0 * f64::EPSILON);
             if upper - lower <= self.options.accuracy() * upper.abs().max(1.0) && is_aligned {
                 let normal = set.in_normal_cone(simd, set.feature_at(simd, y), pull);
                 let held = scaled::<S, f64>(normal, -dot::<S, f64>(normal, gradient));

@@ -6,6 +6,7 @@ mod beside;
 mod cuboid;
 mod cuboid_axes;
 mod cylinder;
+mod cylinder_axes;
 mod distance;
 mod growth;
 mod lanes;
@@ -35,7 +36,7 @@ pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
 pub(in crate::measure) use placed::{
     ExactContact, ExactQuery, active, direction_to_world, normals_towards, seen_from, to_world,
 };
-pub(in crate::measure) use point::{PointOffset, PointSide, offset_of_point};
+pub(in crate::measure) use point::{PointOffset, PointSide, offset_of_point, offset_of_vector};
 pub(in crate::measure) use projectable::{Offset, Projectable};
 pub(in crate::measure) use segment::Segment;
 pub(in crate::measure) use separating_plane::{SeparatingPlane, separating_plane};

@@ -40,14 +40,14 @@ pub(in crate::measure) struct Farthest<'a> {
     pub(in crate::measure) sought: &'a [Sought],
 }
 
-/// One point of a body that is farthest along a unit vector, as vectorized work.
+/// One point of a body of one constraint that is farthest along a unit vector, as vectorized work.
 pub(super) struct FarthestOne<'a> {
     pub(super) body: &'a Body,
     /// The unit vector, body frame.
     pub(super) n: Vector3<f64>,
-    /// Where to begin, from the centre of the normalization on, and the constraint active there;
-    /// the table of the body where there is none.
-    pub(super) from: Option<(Vector3<f64>, usize)>,
+    /// Where to begin, from the centre of the normalization on; the table of the body where there
+    /// is none.
+    pub(super) from: Option<Vector3<f64>>,
     /// Largest support deficit of the point, metres.
     pub(super) tolerance: f64,
     /// Largest angle between n and the normal at the point, radians.
@@ -56,14 +56,12 @@ pub(super) struct FarthestOne<'a> {
     pub(super) limit: u32,
 }
 
-/// A point within whose displacement one of the body is proven to lie, with the constraint that is
-/// active there.
+/// A point within whose displacement one of the body is proven to lie.
 pub(super) struct FoundOne {
     /// From the centre of the normalization on, body frame, metres.
     pub(super) x: Vector3<f64>,
     /// Proven bound of how much farther along n the body reaches than x, metres.
     pub(super) deficit: f64,
-    pub(super) active: usize,
 }
 
 impl WithSimd for FarthestOne<'_> {
@@ -75,20 +73,13 @@ impl WithSimd for FarthestOne<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { body, n, from, tolerance, angle, limit } = self;
         let n: V3<f64> = n.into();
-        let (start, active) = from.map_or_else(
-            || {
-                let cell = body.outline().cell(simd, n);
-                (cell.farthest(simd, n), body.outline().active(cell.place))
-            },
-            |(x, active)| (x.into(), active),
-        );
+        let start = from.map_or_else(|| body.outline().cell(simd, n).farthest(simd, n), V3::<f64>::from);
         let limit = limit.min(MAX_ROUNDS);
-        let (x, deficit, rounds) = farthest(simd, (body, active), start, n, [tolerance, angle], limit);
-        let holds = deficit <= tolerance && Side::at_home(simd, body, active).others_hold(simd, x);
+        let (x, deficit, rounds) = farthest(simd, (body, 0), start, n, [tolerance, angle], limit);
         // Flat surfaces take more steps than that; what ends earlier has diverged.
         let is_open = rounds == limit && deficit == f64::INFINITY && x.iter().all(|v| v.is_finite());
         let end = is_open.then(|| Vector3::from(x));
-        (if holds { Ok(FoundOne { x: x.into(), deficit, active }) } else { Err(end) }, rounds)
+        (if deficit <= tolerance { Ok(FoundOne { x: x.into(), deficit }) } else { Err(end) }, rounds)
     }
 }
 

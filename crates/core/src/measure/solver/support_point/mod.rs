@@ -2,14 +2,17 @@
 //! support function `h(n) = max n·x` of convex analysis. Every measure that needs it asks here.
 //!
 //! Shapes have closed forms ([`crate::body::ClosedForm`]); else Newton's method starts from the
-//! body's table of support points ([`crate::body::Outline`]) or from a point known before, for one
-//! direction or several at once (`lanes`). What it does not find, as on edges and corners, is a
-//! convex program with an active set (`active_set`), which knows the interior point as well.
+//! body's table of support points ([`crate::body::Outline`]) or from a point known before: for
+//! surfaces without edges along one direction or several at once (`lanes`), else with an active set
+//! ([`crate::measure::solver::edge_newton`]). What it does not find is a convex program
+//! (`active_set`), which knows the interior point as well.
 
 mod active_set;
+mod bracket;
 mod height;
 mod lanes;
 
 pub(in crate::measure) use active_set::{SupportPoint, support_of_a, support_of_b};
-pub(in crate::measure) use height::{Asked, Height, height};
+pub(in crate::measure) use bracket::{Asked, Height};
+pub(in crate::measure) use height::height;
 pub(in crate::measure) use lanes::{Farthest, Sought};

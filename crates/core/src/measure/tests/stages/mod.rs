@@ -10,7 +10,7 @@ mod casts;
 mod depths;
 mod impacts;
 
-use super::{random_pose, zoo};
+use super::{Zoo, random_pose, zoo};
 use crate::body::Body;
 use crate::measure::solver::stages::{Stage, except, only};
 use crate::measure::*;
@@ -32,7 +32,7 @@ struct Case {
 
 impl Case {
     fn new(seed: u64) -> Self {
-        static ZOOS: OnceLock<Vec<Vec<Body>>> = OnceLock::new();
+        static ZOOS: OnceLock<Vec<Zoo>> = OnceLock::new();
         let zoos = ZOOS.get_or_init(|| (0..6).map(|seed| zoo(&mut Seeded(90_000 + seed))).collect());
         let mut random = Seeded(91_000 + seed);
         let bodies = &zoos[seed as usize % zoos.len()];
