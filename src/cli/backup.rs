@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::client::{Client, ClientOptions};
+use crate::robot::counted;
 use crate::store::{self, Counts};
 
 /// Copy the catalogue of a running server into a file
@@ -59,7 +60,7 @@ pub(super) fn backup(args: &BackupArgs) -> Result<(), Box<dyn Error>> {
     file.as_file().sync_all().map_err(named)?;
     file.persist(&args.out).map_err(|error| named(error.error))?;
     File::open(dir).and_then(|dir| dir.sync_all()).map_err(named)?;
-    writeln!(io::stdout().lock(), "{}: {bytes} bytes", args.out.display())?;
+    writeln!(io::stdout().lock(), "{}: {}", args.out.display(), counted(bytes, "byte", "bytes"))?;
     Ok(())
 }
 
@@ -69,6 +70,7 @@ pub(super) fn backup(args: &BackupArgs) -> Result<(), Box<dyn Error>> {
 /// A directory that has one, and a file that is no backup or is not valid.
 pub(super) fn restore(args: &RestoreArgs) -> Result<(), Box<dyn Error>> {
     let Counts { bodies, scenes, .. } = store::restore(&args.file, &args.data)?;
-    writeln!(io::stdout().lock(), "{}: {bodies} bodies, {scenes} scenes", args.data.display())?;
+    let (bodies, scenes) = (counted(bodies, "body", "bodies"), counted(scenes, "scene", "scenes"));
+    writeln!(io::stdout().lock(), "{}: {bodies}, {scenes}", args.data.display())?;
     Ok(())
 }

@@ -4,6 +4,7 @@ use super::files::{read, write_atomically};
 use crate::body::{Body, Constraint, Normalization};
 use crate::fit::certificate;
 use crate::polynomial::{Exponents, Polynomial};
+use crate::robot::counted;
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -137,10 +138,9 @@ pub(super) fn run(args: &CertifyArgs) -> Result<(), Box<dyn Error>> {
 fn certified(constraint: &InputConstraint) -> Result<Constraint, Box<dyn Error>> {
     let InputConstraint { exponents, coefficients, .. } = constraint;
     if exponents.len() != coefficients.len() {
-        let (found, needed) = (coefficients.len(), exponents.len());
-        return Err(
-            format!("coefficients: has {found} entries for {needed} exponents; one is needed per exponent").into()
-        );
+        let found = counted(coefficients.len(), "entry", "entries");
+        let needed = counted(exponents.len(), "exponent", "exponents");
+        return Err(format!("coefficients: has {found} for {needed}; one is needed per exponent").into());
     }
     let polynomial = Polynomial::new(exponents.iter().copied().zip(coefficients.iter().copied()).collect())?;
     let gram = certificate(&polynomial)?;

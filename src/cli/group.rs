@@ -10,6 +10,7 @@ use super::push;
 use crate::body::{Body, Obstacle};
 use crate::fit::Progress;
 use crate::jobs::{FitOutput, Shapes, fit_group};
+use crate::robot::counted;
 use crate::store::{FitRequest, FittedBody};
 use indicatif::ProgressBar;
 use serde::Serialize;
@@ -60,8 +61,8 @@ pub(super) fn run(args: &FitArgs, name: &str) -> Result<(), Box<dyn Error>> {
         let (before, after) = (volume(&|row| row.members_volume_m3), volume(&|row| row.volume_m3));
         writeln!(
             out,
-            "{} bodies of {before:.4e} m³ in {} of {after:.4e} m³, {:+.1} %, in {:.1} s",
-            obstacles.len(),
+            "{} of {before:.4e} m³ in {} of {after:.4e} m³, {:+.1} %, in {:.1} s",
+            counted(obstacles.len(), "body", "bodies"),
             rows.len(),
             100.0 * (after / before - 1.0),
             start.elapsed().as_secs_f64()

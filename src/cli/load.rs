@@ -11,6 +11,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use super::write_atomically;
 use crate::client::{Client, ClientOptions};
 use crate::load::{Arrivals, EchoProcess, LoadOptions, LoadReport, Scenario, Watched, connect, measure, prepare};
+use crate::robot::counted;
 
 /// Load a running server, and report how long its answers take
 ///
@@ -199,7 +200,8 @@ fn shown(target: &'static str, rate: f64) -> impl FnMut(f64, u64) {
     move |seconds, answered| {
         if terminal {
             // Progress is not worth an error.
-            let _ = write!(io::stderr(), "\r\x1b[K{target} at {rate}/s: {seconds:.0} s, {answered} answers\r");
+            let answers = counted(answered, "answer", "answers");
+            let _ = write!(io::stderr(), "\r\x1b[K{target} at {rate}/s: {seconds:.0} s, {answers}\r");
         }
     }
 }

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use nalgebra::Vector3;
 
 use crate::measure::Pose;
+use crate::robot::counted;
 
 /// Any number of numbers with commas between them.
 #[derive(Clone, Debug)]
@@ -28,8 +29,8 @@ impl FromStr for Triple {
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = numbers(text)?;
         let [x, y, z] = numbers[..] else {
-            let count = numbers.len();
-            return Err(format!("{count} numbers; give three with commas between them, such as 0.5,0.3,0.02"));
+            let count = counted(numbers.len(), "number", "numbers");
+            return Err(format!("{count}; give three with commas between them, such as 0.5,0.3,0.02"));
         };
         Ok(Self(Vector3::new(x, y, z)))
     }
@@ -47,7 +48,10 @@ impl FromStr for PoseNumbers {
         let (translation, quaternion) = match numbers[..] {
             [x, y, z] => (Vector3::new(x, y, z), [0.0, 0.0, 0.0, 1.0]),
             [x, y, z, i, j, k, w] => (Vector3::new(x, y, z), [i, j, k, w]),
-            _ => return Err(format!("{} numbers; give X,Y,Z or X,Y,Z,QX,QY,QZ,QW", numbers.len())),
+            _ => {
+                let count = counted(numbers.len(), "number", "numbers");
+                return Err(format!("{count}; give X,Y,Z or X,Y,Z,QX,QY,QZ,QW"));
+            }
         };
         Pose::from_quaternion(translation, quaternion).map(Self).map_err(|error| error.to_string())
     }
@@ -72,5 +76,6 @@ mod tests {
         assert!(refused("0,x,0").contains("\"x\" is not a number"));
         assert_eq!("1,2,3".parse::<Triple>().expect("three").0, Vector3::new(1.0, 2.0, 3.0));
         assert!("1,2".parse::<Triple>().expect_err("two").contains("2 numbers"));
+        assert!("1".parse::<Triple>().expect_err("one").starts_with("1 number; "));
     }
 }

@@ -3,6 +3,7 @@
 use super::files::read;
 use super::numbers::PoseNumbers;
 use crate::measure::{Pose, PoseError};
+use crate::robot::counted;
 use nalgebra::{Matrix3, Vector3};
 use std::error::Error;
 use std::path::PathBuf;
@@ -43,7 +44,7 @@ enum PosesError {
     #[error("{place}'{text}' is not a number")]
     Number { place: String, text: String },
     /// Too few or too many numbers.
-    #[error("{place}{found} numbers where {expected} are needed: {order}")]
+    #[error("{place}{} where {expected} are needed: {order}", counted(*found, "number", "numbers"))]
     Count { place: String, found: usize, expected: usize, order: &'static str },
     /// The numbers are no rigid motion.
     #[error("{place}{source}")]

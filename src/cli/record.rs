@@ -8,6 +8,7 @@ use std::path::PathBuf;
 
 use crate::client::{ClientOptions, endpoint};
 use crate::load::Recorder;
+use crate::robot::counted;
 
 /// Write down the questions that clients ask a server, for `sublevel load`
 ///
@@ -55,7 +56,7 @@ pub(super) fn run(args: &RecordArgs) -> Result<(), Box<dyn Error>> {
             }
         };
         let calls = recorder.run(stop).await?;
-        writeln!(io::stderr(), "{}: {calls} calls", args.out.display())?;
+        writeln!(io::stderr(), "{}: {}", args.out.display(), counted(calls, "call", "calls"))?;
         Ok(())
     })
 }

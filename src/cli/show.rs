@@ -4,6 +4,7 @@ use super::files::{read, read_shape, write_atomically};
 use super::sos_body;
 use crate::body::{Body, Compound, Shape, Solid, SosBody, Sphere};
 use crate::draw::{Ink, Outline, Panel, Silhouettes, View, boundary_points, outline};
+use crate::robot::counted;
 use serde_json::json;
 use std::error::Error;
 use std::fmt::Write as _;
@@ -92,7 +93,8 @@ fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
     let terms: Vec<_> = body.constraints().iter().map(|c| c.polynomial.terms().len().to_string()).collect();
     writeln!(out, "{}", body.name())?;
     writeln!(out, "  id              {}", body.id())?;
-    writeln!(out, "  degree          {}, {} constraint(s) of {} terms", body.degree(), terms.len(), terms.join(", "))?;
+    let constraints = counted(terms.len(), "constraint", "constraints");
+    writeln!(out, "  degree          {}, {constraints} of {} terms", body.degree(), terms.join(", "))?;
     writeln!(
         out,
         "  volume          {:.6e} m³ (quadrature error about {:.0e})",
@@ -111,8 +113,9 @@ fn describe(out: &mut impl Write, body: &Body) -> io::Result<()> {
     if let Some(points) = body.points() {
         writeln!(
             out,
-            "  fitted around   {} points, sha256 {} ('verify --points' proves it)",
-            points.count, points.sha256
+            "  fitted around   {}, sha256 {} ('verify --points' proves it)",
+            counted(points.count, "point", "points"),
+            points.sha256
         )?;
     }
     for set in body.sets() {
@@ -156,12 +159,12 @@ fn describe_compound(out: &mut impl Write, compound: &Compound) -> io::Result<()
     let bounds = compound.bounding_box();
     writeln!(out, "{}", compound.name())?;
     writeln!(out, "  id              {}", compound.id())?;
-    writeln!(out, "  compound        of {} parts", compound.parts().len())?;
+    writeln!(out, "  compound        of {}", counted(compound.parts().len(), "part", "parts"))?;
     for (index, part) in compound.parts().iter().enumerate() {
         let gap = part.gap_m().map_or(String::new(), |gap| format!(", gap {gap:.3e} m"));
-        let (degree, constraints) = (part.degree(), part.constraints().len());
+        let (degree, constraints) = (part.degree(), counted(part.constraints().len(), "constraint", "constraints"));
         let volume = part.volume().volume_m3;
-        writeln!(out, "    {index:<14}degree {degree}, {constraints} constraint(s), {volume:.6e} m³{gap}")?;
+        writeln!(out, "    {index:<14}degree {degree}, {constraints}, {volume:.6e} m³{gap}")?;
     }
     let (union, error) = (volume.volume_m3, volume.error_m3);
     writeln!(out, "  volume          {union:.6e} m³ of the union (quadrature error about {error:.0e})")?;
@@ -169,9 +172,9 @@ fn describe_compound(out: &mut impl Write, compound: &Compound) -> io::Result<()
     if let Some(covering) = compound.covering() {
         writeln!(
             out,
-            "  covers          {} of {} triangles, sha256 {} ('verify --points' proves it)",
+            "  covers          {} of {}, sha256 {} ('verify --points' proves it)",
             covering.proven.name(),
-            covering.corners.count / 3,
+            counted(covering.corners.count / 3, "triangle", "triangles"),
             covering.corners.sha256
         )?;
     }
@@ -227,7 +230,8 @@ fn silhouettes(shape: &Shape) -> String {
     let (name, what) = match shape {
         Shape::Body(body) => (body.name(), format!("degree {}", body.degree())),
         Shape::Compound(compound) => {
-            (compound.name(), format!("{} parts, degree {}", compound.parts().len(), compound.degree()))
+            let parts = counted(compound.parts().len(), "part", "parts");
+            (compound.name(), format!("{parts}, degree {}", compound.degree()))
         }
     };
     Silhouettes { title: name.into(), legend: vec![(Ink::Blue, what)], rows }.to_svg()

@@ -4,6 +4,7 @@ use super::files::read;
 use super::outcome::{Outcome, one_line};
 use super::verify_args::VerifyArgs;
 use crate::body::{Coverage, SosBody, Uncovered};
+use crate::robot::counted;
 use serde::Serialize;
 use serde_json::json;
 use std::error::Error;
@@ -60,8 +61,9 @@ fn describe(out: &mut impl Write, body: &SosBody) -> io::Result<()> {
     if let Some(points) = body.points() {
         writeln!(
             out,
-            "  fitted around   {} points, sha256 {} ('verify --points' proves it)",
-            points.count, points.sha256
+            "  fitted around   {}, sha256 {} ('verify --points' proves it)",
+            counted(points.count, "point", "points"),
+            points.sha256
         )?;
     }
     if let Some(coverage) = body.covered() {

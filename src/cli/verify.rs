@@ -11,6 +11,7 @@ use crate::body::{BasicSet, Body, Compound, Obstacle, Shape, SosBody};
 use crate::body::{Covering, Division, NotCovered, Piece};
 #[cfg(feature = "fit")]
 use crate::fit::Mesh;
+use crate::robot::counted;
 use crate::robot::motion::Certificate;
 #[cfg(feature = "fit")]
 use nalgebra::Vector3;
@@ -156,15 +157,16 @@ fn motion(args: &VerifyArgs, text: &str) -> Outcome {
         serde_json::to_writer(&mut out, &report)?;
         writeln!(out)?;
     } else if let Ok((verified, certificate)) = &checked {
-        let segments = certificate.path().segments();
-        writeln!(out, "{}: proven free over all of its path of {segments} segments", args.file.display())?;
-        let configurations = verified.configurations;
+        let segments = counted(certificate.path().segments(), "segment", "segments");
+        writeln!(out, "{}: proven free over all of its path of {segments}", args.file.display())?;
         if verified.pairs == 0 {
             writeln!(out, "there are no pairs that could touch")?;
         } else {
             // Rounded downwards.
             let least = (verified.clearance_lower_m * 1e4).floor() / 1e4;
-            writeln!(out, "{} pairs keep at least {least:.4} m, by {configurations} configurations", verified.pairs)?;
+            let pairs = counted(verified.pairs, "pair keeps", "pairs keep");
+            let configurations = counted(verified.configurations, "configuration", "configurations");
+            writeln!(out, "{pairs} at least {least:.4} m, by {configurations}")?;
         }
     }
     if let Some(trouble) = &trouble {

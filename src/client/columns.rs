@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::error::ClientError;
 use crate::measure::Twist;
+use crate::robot::counted;
 
 /// Rows of two indices.
 pub(super) fn index_pairs(bytes: &[u8]) -> impl Iterator<Item = [u32; 2]> {
@@ -47,7 +48,8 @@ pub(super) fn of_rows(field: &str, column: &[u8], rows: usize, width: usize) -> 
     if column.len() == rows * width {
         return Ok(());
     }
-    Err(ClientError::unreadable(field, format!("has {} bytes for {rows} rows of {width}", column.len())))
+    let (bytes, rows) = (counted(column.len(), "byte", "bytes"), counted(rows, "row", "rows"));
+    Err(ClientError::unreadable(field, format!("has {bytes} for {rows} of {width}")))
 }
 
 /// All numbers of a column.
@@ -56,5 +58,6 @@ pub(super) fn numbers(field: &str, column: &[u8]) -> Result<Vec<f64>, ClientErro
     if rest.is_empty() {
         return Ok(numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect());
     }
-    Err(ClientError::unreadable(field, format!("has {} bytes; a number has 8", column.len())))
+    let bytes = counted(column.len(), "byte", "bytes");
+    Err(ClientError::unreadable(field, format!("has {bytes}; a number has 8")))
 }

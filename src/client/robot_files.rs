@@ -93,7 +93,7 @@ impl RobotFiles {
     }
 
     /// How far the body of a link may reach beyond the convex hull of its meshes, or of the parts
-    /// of this, metres; 0.02 where nothing is said.
+    /// of this, metres; where nothing is said, each link gets one body of degree 6.
     #[must_use]
     pub fn with_max_gap(mut self, max_gap_m: f64) -> Self {
         self.max_gap_m = Some(max_gap_m);

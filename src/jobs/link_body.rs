@@ -19,8 +19,16 @@ pub enum LinkFit {
     /// The cheapest representation that reaches at most so far, metres, beyond the convex hull of
     /// the link, or of the parts of this.
     WithinGap(f64),
-    /// One body of this degree.
+    /// One body of this degree, of the least volume that is found.
     Degree(usize),
+}
+
+impl Default for LinkFit {
+    /// Of what was fitted to the links of an arm, one body of degree 6 kept as many states free
+    /// as two bodies did, and was as fast as coarser ones (`docs/panda.md`).
+    fn default() -> Self {
+        Self::Degree(6)
+    }
 }
 
 /// Why a link has no body.
@@ -78,7 +86,7 @@ pub fn link_request(link: &str, fit: LinkFit) -> Result<FitRequest, RequestError
     let (polynomial, preparation) = (FitPolynomial::default(), FitPreparation::default());
     let mode: FitMode = match fit {
         LinkFit::Degree(degree) => {
-            let polynomial = FitPolynomial { degree: Some(degree), ..polynomial };
+            let polynomial = FitPolynomial { degree: Some(degree), refine: true, ..polynomial };
             FitBody { polynomial, slabs: 0, preparation }.into()
         }
         LinkFit::WithinGap(max_gap_m) => FitWithinGap { max_gap_m, polynomial, preparation }.into(),

@@ -12,6 +12,7 @@ use tokio::sync::watch;
 
 use super::admin_listener::AdminListener;
 use super::metrics::Metrics;
+use crate::robot::counted;
 use crate::store::{Catalogue, Counts};
 
 /// What the probes look at.
@@ -51,11 +52,12 @@ async fn ready(State(admin): State<Admin>) -> impl IntoResponse {
         return (StatusCode::SERVICE_UNAVAILABLE, "loading the catalogue\n".to_owned());
     };
     let mut said = "ok\n".to_owned();
+    let [one, many] = ["is", "are"].map(|verb| format!("of {bodies} bodies {verb}"));
     if unproven_bodies > 0 {
-        said += &format!("{unproven_bodies} of {bodies} bodies are still to be proven\n");
+        said += &format!("{} still to be proven\n", counted(unproven_bodies, &one, &many));
     }
     if damaged_bodies > 0 {
-        said += &format!("{damaged_bodies} of {bodies} bodies are damaged and not used; the log names them\n");
+        said += &format!("{} damaged and not used; see the log\n", counted(damaged_bodies, &one, &many));
     }
     (StatusCode::OK, said)
 }

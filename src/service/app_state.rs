@@ -9,6 +9,7 @@ use std::time::Instant;
 use tokio::sync::{Semaphore, oneshot, watch};
 use tonic::Status;
 
+use crate::robot::counted;
 use crate::scene::{Crew, Panicked, Question, Scene, Stop};
 use crate::store::{Catalogue, CatalogueError, Counts, LiveScene};
 
@@ -205,7 +206,9 @@ impl AppState {
             Ok(done) => done,
             Err(_) => {
                 let Counts { bodies, unproven_bodies, .. } = catalogue.counts();
-                let why = format!("{unproven_bodies} of {bodies} bodies are still to be proven; try again in a moment");
+                let [one, many] = ["is", "are"].map(|verb| format!("of {bodies} bodies {verb}"));
+                let unproven = counted(unproven_bodies, &one, &many);
+                let why = format!("{unproven} still to be proven; try again in a moment");
                 Err(error::unavailable(Reason::Loading, &why))
             }
         }

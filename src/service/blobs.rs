@@ -11,6 +11,7 @@ use super::error::{self, Invalid};
 use super::limits::{BLOB_IDLE, MAX_BLOB_BYTES, MAX_BLOBS_BYTES};
 use super::proto::{UploadBlobRequest, UploadBlobResponse};
 use super::reason::Reason;
+use crate::robot::counted;
 
 /// All blobs of a server.
 #[derive(Debug, Default)]
@@ -103,8 +104,8 @@ impl Blobs {
         let from = usize::try_from(*offset).unwrap_or(usize::MAX);
         let end = from.saturating_add(data.len());
         if from > received || end > total {
-            let why =
-                format!("is {from} with {} bytes, and {received} of {total} are there; go on from there", data.len());
+            let bytes = counted(data.len(), "byte", "bytes");
+            let why = format!("is {from} with {bytes}, and {received} of {total} are there; go on from there");
             return Err(Invalid::new("offset", why).into());
         }
         if end > received {

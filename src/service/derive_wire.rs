@@ -1,12 +1,13 @@
 //! Pairs of links of a robot in messages.
 
 use super::error::Invalid;
+use super::limits::MAX_MESSAGE_BYTES;
 use super::packed::Packed;
 use super::proto::{self, AllowedPairsProgress, AllowedPairsResult, AllowedPairsTask, DeriveAllowedPairsRequest};
 use super::robot_wire::robot_id;
 use crate::jobs::{Progress, RequestError, check_derive};
 use crate::robot::motion::{DEFAULT_DERIVE_RESOLUTION_M, DEFAULT_MAX_BOXES, PairClass};
-use crate::store::{DeriveOutcome, DeriveRequest, DerivedLinkPair};
+use crate::store::{DeriveOutcome, DeriveRequest, DerivedLinkPair, LoadedRobot};
 
 /// Classes of messages and of outcomes.
 const CLASSES: [(proto::PairClass, PairClass); 5] = [
@@ -28,6 +29,32 @@ pub(super) fn request(message: &DeriveAllowedPairsRequest) -> Result<(String, De
     let refused = |RequestError { field, why }| Invalid::new(field, why);
     check_derive(&message.request_id, &request).map_err(refused)?;
     Ok((message.request_id.clone(), request))
+}
+
+/// Bytes that a pair of links takes in a message at most, but for the names of the links, its
+/// witness, and the reason of the SRDF.
+const PAIR_BYTES: usize = 64;
+
+/// Bytes of a job that a message has beside its pairs, at most.
+const JOB_BYTES: usize = 1024;
+
+/// Refuses a robot whose pairs of links, each with a witness, may fit no message.
+pub(super) fn check_size(loaded: &LoadedRobot) -> Result<(), Invalid> {
+    let kinematics = loaded.robot.kinematics();
+    let with_geometry = kinematics.links().iter().zip(loaded.robot.links()).filter(|(_, link)| link.is_some());
+    let (links, name_bytes) = with_geometry.fold((0, 0), |(links, bytes), (name, _)| (links + 1, bytes + name.len()));
+    let others = links.max(1) - 1;
+    let pairs = links * others / 2 * (PAIR_BYTES + 8 * kinematics.width());
+    let reasons: usize = loaded.semantics.disabled_pairs.iter().map(|pair| pair.reason.len()).sum();
+    // A link is named by its pairs with all others.
+    if pairs + others * name_bytes + reasons > MAX_MESSAGE_BYTES - JOB_BYTES {
+        let why = format!(
+            "has {links} links with geometry; the names of all pairs, their witnesses and what the SRDF says of them \
+             may fit no message"
+        );
+        return Err(Invalid::new("robot_id", why));
+    }
+    Ok(())
 }
 
 /// The message of a request.

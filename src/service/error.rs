@@ -299,6 +299,8 @@ fn scene(error: &SceneError) -> Status {
             };
             Invalid::new(format!("{}.{leaf}", path(at, Leaf::Joints)), error).into()
         }
+        SceneError::LinkPose { at, .. } if at.list == List::Bases => invalid(at, Leaf::Base),
+        SceneError::LinkPose { at, .. } => invalid(at, Leaf::Joints),
         SceneError::Pose { .. } => Invalid::new("set_poses", error).into(),
         SceneError::Circle { .. } => Invalid::new("attach", error).into(),
         SceneError::Holds { .. } => failed_precondition(Reason::ObjectHolds, "remove_objects", error.to_string()),
@@ -314,6 +316,7 @@ enum Leaf {
     Padding,
     Attachment,
     Joints,
+    Base,
 }
 
 /// Path of an entry of an update in `UpdateSceneRequest`.
@@ -352,6 +355,7 @@ fn path(at: &Entry, leaf: Leaf) -> String {
         (_, Leaf::Padding) => ".padding_m",
         (_, Leaf::Attachment) => ".attachment.pose",
         (_, Leaf::Joints) => ".joints",
+        (_, Leaf::Base) => ".base",
     };
     format!("{list}[{}]{leaf}", at.index)
 }

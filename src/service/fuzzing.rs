@@ -1,6 +1,7 @@
 //! What the targets in `fuzz/` call: bytes as clients and operators may send them. Compiled for
 //! them only.
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use figment::Figment;
@@ -17,17 +18,19 @@ use super::metrics::Metrics;
 use super::proto::body_service_server::BodyService;
 use super::proto::query_service_server::QueryService;
 use super::proto::{
-    CheckMotionsRequest, LoadRobotRequest, LoadRobotResponse, UpdateSceneRequest, VerifyMotionRequest,
-    VerifyMotionResponse,
+    CheckMotionsRequest, DeriveAllowedPairsRequest, LoadRobotRequest, LoadRobotResponse, UpdateSceneRequest, Verdict,
+    VerifyMotionRequest, VerifyMotionResponse,
 };
 use super::queries::Queries;
 use super::tokens::Tokens;
-use super::{error, robot_wire, robots, scene_wire};
+use super::{derive_wire, error, robot_wire, robots, scene_wire};
 use crate::body::Body;
+use crate::jobs;
 use crate::measure::Pose;
+use crate::robot::motion::PairClass;
 use crate::robot::motion::fuzzing::sealed;
 use crate::scene::{PlaceRobot, Placement, Scene, Update};
-use crate::store::{Catalogue, RobotSource, Store};
+use crate::store::{Catalogue, DeriveOutcome, DeriveRequest, RobotSource, Store};
 
 /// A server of one small scene with a robot, without a network.
 #[derive(Debug)]
@@ -62,6 +65,9 @@ const URDF: &str = r#"<robot name="arm">
 
 /// Most configurations of a path, so that a call of many paths takes a second at most.
 const MOST_CONFIGURATIONS: u32 = 200;
+
+/// Most boxes of joint values for a pair of links, so that a search takes a tenth of a second.
+const MOST_BOXES: u32 = 200;
 
 impl Served {
     /// Starts it.
@@ -100,7 +106,7 @@ impl Served {
     pub fn call(&self, bytes: &[u8]) {
         let Some((kind, message)) = bytes.split_first() else { return };
         let queries = Queries(self.app.clone());
-        match kind % 10 {
+        match kind % 11 {
             0 => self.ask(message, |request| async { queries.evaluate(request).await.map(drop) }),
             1 => self.ask(message, |request| async { queries.check_states(request).await.map(drop) }),
             2 => self.ask(message, |request| async { queries.clearance(request).await.map(drop) }),
@@ -113,7 +119,8 @@ impl Served {
             6 => self.check_motions(message, &queries),
             7 => self.verify_motion(message, &queries),
             8 => self.ask(message, |request| async { queries.explain(request).await.map(drop) }),
-            _ => self.load_robot(message),
+            9 => self.load_robot(message),
+            _ => self.derive_allowed_pairs(message, &queries),
         }
     }
 
@@ -216,6 +223,58 @@ impl Served {
         assert!(firsts.eq(robot.joints.iter().map(|joint| joint.first)), "{robot:?}");
         let response = LoadRobotResponse { robot: Some(robot), created: true };
         error::fits(&response).expect("a small message");
+    }
+
+    /// Looks for links that touch as the job does, to its end, and does not keep it. What is found
+    /// comes back from the wire.
+    fn derive_allowed_pairs(&self, message: &[u8], queries: &Queries) {
+        let Ok(mut request) = DeriveAllowedPairsRequest::decode(message) else { return };
+        let most = request.max_boxes.unwrap_or(MOST_BOXES);
+        request.max_boxes = Some(most.min(MOST_BOXES));
+        let asked = match derive_wire::request(&request) {
+            Ok((_, asked)) => asked,
+            Err(invalid) => return check_status(&invalid.into()),
+        };
+        let loaded = match self.catalogue.robot(&asked.robot) {
+            Ok(loaded) => loaded,
+            Err(why) => return check_status(&error::catalogue(&why, "robot_id")),
+        };
+        derive_wire::check_size(&loaded).expect("a small robot");
+        let found = jobs::derive(&asked, &loaded, &mut |_| ControlFlow::Continue(())).expect("a finite margin");
+        // Three links have geometry.
+        assert_eq!(found.pairs.len(), 3, "{found:?}");
+        self.check_pairs(&asked, &found, queries);
+        let sent = derive_wire::task(&asked, None, Some(&found));
+        assert_eq!(sent.result.as_ref().and_then(derive_wire::outcome), Some(found));
+    }
+
+    /// What is in contact is nearer than the margin, and not proven free where it is said to be;
+    /// what never is was nowhere seen that near.
+    fn check_pairs(&self, asked: &DeriveRequest, found: &DeriveOutcome, queries: &Queries) {
+        for pair in &found.pairs {
+            assert!(pair.boxes <= asked.max_boxes, "{pair:?}");
+            match pair.class {
+                PairClass::Never => assert!(pair.upper_m.is_none_or(|upper| upper > asked.margin_m), "{pair:?}"),
+                PairClass::Always | PairClass::Collides => {
+                    assert!(pair.upper_m.is_some_and(|upper| upper < asked.margin_m), "{pair:?}");
+                    let witness = pair.witness.as_deref().expect("a configuration");
+                    let stays = CheckMotionsRequest {
+                        scene: SCENE.into(),
+                        robot: ROBOT.into(),
+                        joint_values: robot_wire::numbers(&[witness, witness].concat()),
+                        margin_m: asked.margin_m,
+                        include_allowed: true,
+                        max_configurations: Some(1),
+                        ..CheckMotionsRequest::default()
+                    };
+                    let answered = self.runtime.block_on(queries.check_motions(Request::new(stays)));
+                    let answer = answered.expect("an answer").into_inner();
+                    let proven = [Verdict::Contact, Verdict::Undecided].map(|verdict| verdict as u8);
+                    assert!(proven.contains(&answer.verdicts[0]), "{pair:?}: {answer:?}");
+                }
+                PairClass::Adjacent | PairClass::Undecided => {}
+            }
+        }
     }
 }
 

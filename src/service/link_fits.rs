@@ -23,9 +23,6 @@ use crate::jobs::{LinkFit, Mesh, fit_link, has_mesh, link_mesh, link_request, re
 use crate::robot::{Link, read_srdf, read_urdf};
 use crate::scene::Geometry;
 
-/// How far bodies may reach beyond their links unless something else is asked for, metres.
-const DEFAULT_MAX_GAP_M: f64 = 0.02;
-
 /// Links that are remembered.
 const MAX_KNOWN: usize = 1000;
 
@@ -56,7 +53,7 @@ impl LinkFits {
     /// Fits bodies to the meshes of a request, stores them, and names them in its `link_bodies`.
     pub(super) async fn resolve(&self, app: &AppState, request: &mut LoadRobotRequest) -> Result<(), Status> {
         let meshes = std::mem::take(&mut request.meshes);
-        let how = LinkFit::WithinGap(request.max_gap_m.unwrap_or(DEFAULT_MAX_GAP_M));
+        let how = request.max_gap_m.map_or_else(LinkFit::default, LinkFit::WithinGap);
         link_request("link", how).map_err(|error| Invalid::new(error.field, error.why))?;
         if meshes.is_empty() {
             return Ok(());
@@ -131,8 +128,9 @@ fn links_with_meshes(
         read_srdf(srdf, &description).map_err(|error| Invalid::new("srdf", error))?;
     }
     let mut read: Vec<Option<Arc<Mesh>>> = vec![None; meshes.len()];
+    let mut places = HashMap::with_capacity(meshes.len());
     for (index, mesh) in meshes.iter().enumerate() {
-        if meshes[..index].iter().any(|other| other.uri == mesh.uri) {
+        if places.insert(mesh.uri.as_str(), index).is_some() {
             return Err(Invalid::new(format!("meshes[{index}].uri"), "is sent twice; send each file once").into());
         }
     }
@@ -140,7 +138,7 @@ fn links_with_meshes(
     for link in description.links.iter().filter(|link| has_mesh(link) && !given.iter().any(|name| **name == *link.name))
     {
         let mesh = link_mesh(link, |uri| {
-            let Some(index) = meshes.iter().position(|mesh| mesh.uri == uri) else {
+            let Some(&index) = places.get(uri) else {
                 let why = format!(
                     "holds no file for {uri} of link \"{}\"; send it, or a body for the link in link_bodies",
                     link.name

@@ -16,8 +16,8 @@ use super::proto::{
 use super::query_wire::{self, NOTHING, NameTable};
 use super::reason::Reason;
 use super::snapshot::snapshot;
-use crate::robot::Kinematics;
 use crate::robot::motion::{Certificate, MotionAnswer, MotionProblemError, MotionVerdict, PathError, VerifyOptions};
+use crate::robot::{Kinematics, counted};
 use crate::scene::query::{MotionSettings, MovingObject, PathKind, RobotMotionAnswer, RobotMotions, RobotMotionsError};
 use crate::scene::{Geometry, Scene, Stop};
 
@@ -145,7 +145,8 @@ fn moving_objects(scene: &Scene, moving: &MovingObjects) -> Result<Vec<MovingObj
     let to = packed::poses(&moving.end_poses, "moving.end_poses")?;
     for (poses, field) in [(&from, "moving.start_poses"), (&to, "moving.end_poses")] {
         if poses.len() != slots.len() {
-            let why = format!("holds {} poses for {} names; send one a name", poses.len(), slots.len());
+            let (poses, names) = (counted(poses.len(), "pose", "poses"), counted(slots.len(), "name", "names"));
+            let why = format!("holds {poses} for {names}; send one a name");
             return Err(Invalid::new(field, why).into());
         }
     }
@@ -196,7 +197,9 @@ fn motions_error(error: &RobotMotionsError, scene: &Scene, moving: Option<&Movin
         None => "robot".to_owned(),
     };
     let field = match error {
-        RobotMotionsError::NoRobot(_) | RobotMotionsError::Far(_) => "robot".to_owned(),
+        RobotMotionsError::NoRobot(_)
+        | RobotMotionsError::Far(_)
+        | RobotMotionsError::Problem(MotionProblemError::Pairs(_)) => "robot".to_owned(),
         RobotMotionsError::Held(object) | RobotMotionsError::HalfSpace(object) | RobotMotionsError::TooFar(object) => {
             of_moving("names", object)
         }

@@ -4,6 +4,7 @@ use bytes::Bytes;
 use nalgebra::Vector3;
 
 use crate::measure::{Pose, PoseError, Twist};
+use crate::robot::counted;
 
 use super::error::Invalid;
 
@@ -15,7 +16,8 @@ pub(super) fn rows<const WIDTH: usize>(bytes: &[u8], field: &str) -> Result<Vec<
     let (numbers, rest) = bytes.as_chunks::<8>();
     let (rows, left) = numbers.as_chunks::<WIDTH>();
     if !rest.is_empty() || !left.is_empty() {
-        let why = format!("has {} bytes; send {} bytes (float64) a row of {WIDTH}", bytes.len(), 8 * WIDTH);
+        let found = counted(bytes.len(), "byte", "bytes");
+        let why = format!("has {found}; send {} bytes (float64) a row of {WIDTH}", 8 * WIDTH);
         return Err(Invalid::new(field, why));
     }
     Ok(rows.iter().map(|row| row.map(f64::from_le_bytes)).collect())
@@ -31,7 +33,8 @@ pub(super) fn indices<const WIDTH: usize>(bytes: &[u8], field: &str) -> Result<V
     let (numbers, rest) = bytes.as_chunks::<4>();
     let (rows, left) = numbers.as_chunks::<WIDTH>();
     if !rest.is_empty() || !left.is_empty() {
-        let why = format!("has {} bytes; send {} bytes (uint32) a row of {WIDTH}", bytes.len(), 4 * WIDTH);
+        let found = counted(bytes.len(), "byte", "bytes");
+        let why = format!("has {found}; send {} bytes (uint32) a row of {WIDTH}", 4 * WIDTH);
         return Err(Invalid::new(field, why));
     }
     Ok(rows.iter().map(|row| row.map(u32::from_le_bytes)).collect())

@@ -14,6 +14,7 @@ use super::proto::{StreamPosesRequest, StreamPosesResponse};
 use super::reason::Reason;
 use super::{packed, wire};
 use crate::measure::Pose;
+use crate::robot::counted;
 use crate::scene::{MAX_OBJECTS, Scene, SceneError, Slot};
 use crate::store::{CatalogueError, LiveScene};
 
@@ -153,14 +154,16 @@ async fn read(
     let indices: Vec<u32> = packed::indices::<1>(&indices, "indices")?.into_iter().flatten().collect();
     let count = if indices.is_empty() { table.names.len() } else { indices.len() };
     if poses.len() != count && !(poses.is_empty() && indices.is_empty()) {
-        let why = format!("holds {} poses for {count} objects; send one for each", poses.len());
+        let (poses, objects) = (counted(poses.len(), "pose", "poses"), counted(count, "object", "objects"));
+        let why = format!("holds {poses} for {objects}; send one for each");
         return Err(Invalid::new("poses", why).into());
     }
     let mut moved = Vec::with_capacity(poses.len());
     for (place, pose) in poses.into_iter().enumerate() {
         let index = indices.get(place).map_or(Some(place), |index| usize::try_from(*index).ok());
         let name = index.and_then(|index| table.names.get(index)).ok_or_else(|| {
-            let why = format!("is no position in the table of {} names; count from 0", table.names.len());
+            let names = counted(table.names.len(), "name", "names");
+            let why = format!("is no position in the table of {names}; count from 0");
             Status::from(Invalid::new(format!("indices[{place}]"), why))
         })?;
         if current.slot(name).is_none() {

@@ -26,6 +26,7 @@ use super::reason::Reason;
 use super::snapshot::snapshot;
 use super::state_reasons::StateReasons;
 use super::{contact_watch, explain, motions, query_wire, wire};
+use crate::robot::counted;
 use crate::scene::query::{
     Answer, AnswerStatus, Ask, Clearance, Found, JointValues, Pairs, RayAnswer, Rays, StateAnswer, StateVerdict,
     States, Within, closest_pair, combined,
@@ -192,7 +193,8 @@ impl QueryService for Queries {
         let origins = packed::rows::<3>(&request.origins_m, "origins_m")?;
         let directions = packed::rows::<3>(&request.directions, "directions")?;
         if origins.len() != directions.len() {
-            let why = format!("holds {} rays, and origins_m {}; send as many", directions.len(), origins.len());
+            let rays = counted(directions.len(), "ray", "rays");
+            let why = format!("holds {rays}, and origins_m {}; send as many", origins.len());
             return Err(Invalid::new("directions", why).into());
         }
         if origins.is_empty() {

@@ -7,6 +7,7 @@ use nalgebra::{UnitQuaternion, Vector3};
 use tonic::Status;
 
 use crate::measure::{HalfSpace, Motion, Pose, RayError};
+use crate::robot::counted;
 use crate::scene::query::{
     Answer, AnswerStatus, Ask, AskError, Certainty, ClearanceRow, Measure, Motions, Operand, PairsError, RaysError,
     Selection, StateClearance, StateVerdict, StatesError, Verdict,
@@ -194,7 +195,8 @@ fn motions(table: &proto::Motions, scene: &Scene) -> Result<Motions, Status> {
     let ends = packed::poses(&table.end_poses, "motions.end_poses")?;
     for (field, count) in [("motions.start_poses", starts.len()), ("motions.end_poses", ends.len())] {
         if count != slots.len() {
-            let why = format!("holds {count} poses for {} names; send one for each", slots.len());
+            let (poses, names) = (counted(count, "pose", "poses"), counted(slots.len(), "name", "names"));
+            let why = format!("holds {poses} for {names}; send one for each");
             return Err(Invalid::new(field, why).into());
         }
     }

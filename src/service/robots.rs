@@ -7,8 +7,6 @@ use super::app_state::AppState;
 use super::derive_wire;
 use super::error::{self, Invalid};
 #[cfg(feature = "fit")]
-use super::limits::MAX_MESSAGE_BYTES;
-#[cfg(feature = "fit")]
 use super::link_fits::LinkFits;
 use super::proto::robot_service_server::RobotService;
 use super::proto::{
@@ -101,12 +99,7 @@ impl Robots {
         if self.app.catalogue().await?.job_of_request(&request_id).is_none() {
             let robot = asked.robot;
             let loaded = self.app.look("robot_id", move |catalogue| catalogue.robot(&robot)).await?;
-            let links = loaded.robot.links().iter().flatten().count();
-            let numbers = links * links.saturating_sub(1) / 2 * (PAIR_NUMBERS + loaded.robot.kinematics().width());
-            if numbers > MAX_PAIRS_NUMBERS {
-                let why = format!("has {links} links with geometry, whose pairs with their witnesses fit no message");
-                return Err(Invalid::new("robot_id", why).into());
-            }
+            derive_wire::check_size(&loaded)?;
         }
         let (jobs, new) = (self.jobs.clone(), NewJob::derive(request_id, asked));
         let create = move |catalogue: &Catalogue| jobs.create(catalogue, new);
@@ -129,14 +122,6 @@ impl Robots {
         Err(Status::unimplemented("this server was built without jobs; build it with the feature fit"))
     }
 }
-
-/// Numbers of 8 bytes that a pair of links takes in a message beside its witness.
-#[cfg(feature = "fit")]
-const PAIR_NUMBERS: usize = 24;
-
-/// Most of them in a message.
-#[cfg(feature = "fit")]
-const MAX_PAIRS_NUMBERS: usize = MAX_MESSAGE_BYTES / 8;
 
 /// Why a robot is not loaded; `links` are those that the request gives bodies for.
 pub(super) fn load_error(error: &CatalogueError, links: &[String]) -> Status {

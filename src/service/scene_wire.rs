@@ -5,6 +5,7 @@ use std::sync::Arc;
 use tonic::Status;
 
 use crate::measure::Pose;
+use crate::robot::counted;
 use crate::scene::{
     Attach, Attachment, NamedJointValues, Object, PlaceRobot, Placement, Robot, RobotId, Scene, Subject, SubjectPair,
     Update,
@@ -206,7 +207,8 @@ pub(super) fn pose_table(table: &proto::PoseTable, field: &str) -> Result<Vec<(A
     }
     let poses = packed::poses(poses, &format!("{field}.poses"))?;
     if names.len() != poses.len() {
-        let why = format!("holds {} poses for {} names; send one for each", poses.len(), names.len());
+        let (poses, names) = (counted(poses.len(), "pose", "poses"), counted(names.len(), "name", "names"));
+        let why = format!("holds {poses} for {names}; send one for each");
         return Err(Invalid::new(format!("{field}.poses"), why));
     }
     Ok(names.iter().map(|name| name.as_str().into()).zip(poses).collect())

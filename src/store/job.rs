@@ -10,6 +10,7 @@ use super::derive::{DeriveOutcome, DeriveRequest};
 use super::hierarchy::{HierarchyOutcome, HierarchyRequest};
 use super::request::FitRequest;
 use crate::body::{Solver, SolverStep};
+use crate::robot::counted;
 
 /// Most jobs that may wait; fits keep their points on disk.
 pub const MAX_QUEUED_JOBS: usize = 64;
@@ -264,14 +265,18 @@ impl fmt::Display for JobState {
         match self {
             Self::Queued => f.write_str("queued"),
             Self::Running => f.write_str("running"),
-            Self::Succeeded(JobOutcome::Fit(outcome)) => write!(f, "succeeded with {} bodies", outcome.bodies.len()),
+            Self::Succeeded(JobOutcome::Fit(outcome)) => {
+                write!(f, "succeeded with {}", counted(outcome.bodies.len(), "body", "bodies"))
+            }
             Self::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome { lower, upper: Some(upper), .. })) => {
                 write!(f, "succeeded with the bracket {lower:e} to {upper:e}")
             }
             Self::Succeeded(JobOutcome::Hierarchy(HierarchyOutcome { lower, upper: None, .. })) => {
                 write!(f, "succeeded with the lower bound {lower:e}")
             }
-            Self::Succeeded(JobOutcome::Derive(outcome)) => write!(f, "succeeded with {} pairs", outcome.pairs.len()),
+            Self::Succeeded(JobOutcome::Derive(outcome)) => {
+                write!(f, "succeeded with {}", counted(outcome.pairs.len(), "pair", "pairs"))
+            }
             Self::Failed(why) => write!(f, "failed: {why}"),
             Self::Cancelled => f.write_str("cancelled"),
         }
@@ -282,7 +287,9 @@ impl fmt::Display for JobState {
 impl fmt::Display for JobTask {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Fit(FitTask { request, points }) => write!(f, "fit \"{}\" of {points} points", request.name),
+            Self::Fit(FitTask { request, points }) => {
+                write!(f, "fit \"{}\" of {}", request.name, counted(*points, "point", "points"))
+            }
             Self::Hierarchy(HierarchyRequest { sets: [a, b], level, .. }) => {
                 write!(f, "hierarchy of bodies {} and {} at level {level}", a.body, b.body)
             }

@@ -498,7 +498,7 @@ async fn a_backup_is_the_catalogue_as_it_was() {
 
     let restored = run(&["restore", &path("backup.redb"), "--data", &path("again")]);
     assert!(restored.status.success(), "{}", String::from_utf8_lossy(&restored.stderr));
-    assert!(String::from_utf8_lossy(&restored.stdout).contains("1 bodies, 1 scenes"));
+    assert!(String::from_utf8_lossy(&restored.stdout).contains("1 body, 1 scene"));
     let again = Running::start(Path::new(&path("again")));
     let after = again.client().await.scene("cell").await.expect("there");
     assert_eq!(after.objects, before.objects);

@@ -170,6 +170,16 @@ pub enum SceneError {
         /// The reason.
         error: PoseError,
     },
+    /// A link would have no pose.
+    #[error("link \"{name}\" would have no usable pose: {error}")]
+    LinkPose {
+        /// The robot, or its joints or base.
+        at: Entry,
+        /// Name of the link's object.
+        name: Arc<str>,
+        /// The reason.
+        error: PoseError,
+    },
     /// A padding that is no length.
     #[error("padding is {padding_m} m; give a finite number of at most {MAX_PADDING_M} m either way")]
     Padding {

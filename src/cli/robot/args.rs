@@ -7,11 +7,12 @@ use crate::cli::fit::length::length;
 /// Load a robot: fit bodies to the meshes of its links, check its URDF and SRDF, and send it to a
 /// server
 ///
-/// Boxes, cylinders, spheres and capsules of the URDF are taken exactly. Of each link with meshes
-/// the cheapest representation is fitted that reaches at most --max-gap beyond the meshes, in the
-/// frame of the link; it is written to the folder as <link>-<hash>.json and not fitted again while
-/// meshes and options stay the same. The table says how well each link is followed; a planner loses
-/// about the configurations in which links are nearer to something than their gaps.
+/// Boxes, cylinders, spheres and capsules of the URDF are taken exactly. Around the meshes of each
+/// link one body is fitted, in the frame of the link, or with --max-gap the cheapest representation
+/// that reaches at most so far beyond them; it is written to the folder as <link>-<hash>.json and
+/// not fitted again while meshes and options stay the same. The table says how well each link is
+/// followed; a planner loses about the configurations in which links are nearer to something than
+/// their gaps.
 ///
 /// With --server the bodies are stored there and the robot is loaded: scenes then place it by its
 /// id, and CheckStates, Clearance and CheckMotions take its joint values.
@@ -33,15 +34,16 @@ pub(in crate::cli) struct RobotArgs {
     /// Folder for the bodies of the links; made with its parents when it is not there
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// How far a body may reach beyond the convex hull of its link, or of the parts of this
+    /// Degree of the body of each link: 2, 4, 6 or 8 [default: 6]
+    #[arg(long, value_name = "N")]
+    pub(super) degree: Option<usize>,
+    /// How far a body may reach beyond the convex hull of its link, or of the parts of this: the
+    /// cheapest that does, instead of one body of a degree
     ///
     /// Such as 5mm, 2cm, or 0.005 (metres). Smaller gaps take more parts and higher degrees, and
     /// longer queries.
-    #[arg(long, value_name = "LENGTH", value_parser = length, default_value = "2cm", conflicts_with = "degree")]
-    pub(super) max_gap: f64,
-    /// Fit one body of this degree to each link instead: 2, 4, 6 or 8
-    #[arg(long, value_name = "N")]
-    pub(super) degree: Option<usize>,
+    #[arg(long, value_name = "LENGTH", value_parser = length, conflicts_with = "degree")]
+    pub(super) max_gap: Option<f64>,
     /// Where package://NAME/... of meshes lies; may be given several times
     #[arg(long = "package", value_name = "NAME=DIR", value_parser = package)]
     pub(super) packages: Vec<(String, PathBuf)>,

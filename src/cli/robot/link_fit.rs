@@ -69,12 +69,12 @@ fn joined(link: &Link, paths: &MeshPaths) -> Result<Mesh, Box<dyn Error>> {
 
 /// Fits a link, or reads the file that an earlier run has written for the same meshes and options.
 fn fit(args: &RobotArgs, link: &Link, mesh: Mesh) -> Result<FittedLink, Box<dyn Error>> {
-    let how = args.degree.map_or(LinkFit::WithinGap(args.max_gap), LinkFit::Degree);
+    let how = args.max_gap.map(LinkFit::WithinGap).or(args.degree.map(LinkFit::Degree)).unwrap_or_default();
     let named =
         |error: RequestError| format!("--{}: {}", error.field.trim_end_matches("_m").replace('_', "-"), error.why);
     link_request(&link.name, how).map_err(named)?;
     let exact = exact_parts(link)?;
-    let file = args.out.join(format!("{}-{}.json", file_name(&link.name), content(args, &mesh, &exact)));
+    let file = args.out.join(format!("{}-{}.json", file_name(&link.name), content(how, &mesh, &exact)));
     let was_kept = file.exists();
     let shape = if was_kept {
         read_shape(&file)?
@@ -102,9 +102,9 @@ fn file_name(link: &str) -> String {
 }
 
 /// Twelve digits of the hash of all that a body is made from.
-fn content(args: &RobotArgs, mesh: &Mesh, exact: &[Body]) -> String {
+fn content(how: LinkFit, mesh: &Mesh, exact: &[Body]) -> String {
     let mut hash = Sha256::new();
-    hash.update(format!("{:?} {:?} ", args.degree, args.max_gap));
+    hash.update(format!("{how:?} "));
     mesh.points.iter().flatten().for_each(|coordinate| hash.update(coordinate.to_le_bytes()));
     mesh.triangles.iter().flatten().for_each(|corner| hash.update((*corner as u64).to_le_bytes()));
     exact.iter().for_each(|body| hash.update(body.id().to_string()));

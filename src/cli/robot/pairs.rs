@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::cli::progress::progress_bar;
 use crate::jobs::derive;
+use crate::robot::counted;
 use crate::robot::motion::{DEFAULT_DERIVE_RESOLUTION_M, DEFAULT_MAX_BOXES, PairClass};
 use crate::store::{DeriveOutcome, DeriveRequest, DerivedLinkPair, LoadedRobot};
 
@@ -32,7 +33,7 @@ pub(super) fn derived(loaded: &LoadedRobot) -> Result<Pairs, Box<dyn Error>> {
     let bar = progress_bar("pairs");
     let outcome = derive(&request, loaded, &mut |at| {
         if at.boxes % 256 == 0 {
-            bar.set_message(format!("{} of {}, {} boxes", at.done + 1, at.pairs, at.boxes));
+            bar.set_message(format!("{} of {}, {}", at.done + 1, at.pairs, counted(at.boxes, "box", "boxes")));
         }
         ControlFlow::Continue(())
     })?;
@@ -61,7 +62,8 @@ impl Pairs {
         let classes =
             [PairClass::Adjacent, PairClass::Never, PairClass::Always, PairClass::Collides, PairClass::Undecided];
         let counts = classes.map(|class| format!("{} {}", count(class), class_name(class)));
-        writeln!(out, "{} pairs in {:.1} s: {}", pairs.len(), self.outcome.seconds, counts.join(", "))?;
+        let all = counted(pairs.len(), "pair", "pairs");
+        writeln!(out, "{all} in {:.1} s: {}", self.outcome.seconds, counts.join(", "))?;
         self.write_srdf(out)
     }
 
@@ -77,11 +79,11 @@ impl Pairs {
             let count = |is: fn(&DerivedLinkPair) -> bool| pairs.iter().filter(|pair| is(pair)).count();
             writeln!(
                 out,
-                "SRDF, {}: {} pairs, {} proven, {} neighbours, {} can touch, {} undecided",
+                "SRDF, {}: {}, {} proven, {}, {} can touch, {} undecided",
                 if reason.is_empty() { "without a reason" } else { reason },
-                pairs.len(),
+                counted(pairs.len(), "pair", "pairs"),
                 count(|pair| pair.is_proven() && !pair.contradicts_srdf()),
-                count(|pair| pair.class == PairClass::Adjacent),
+                counted(count(|pair| pair.class == PairClass::Adjacent), "neighbour", "neighbours"),
                 count(DerivedLinkPair::contradicts_srdf),
                 count(|pair| pair.class == PairClass::Undecided)
             )?;

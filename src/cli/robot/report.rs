@@ -8,7 +8,7 @@ use super::link_fit::FittedLink;
 use super::pairs::Pairs;
 use crate::body::{Body, Solid};
 use crate::client::StoredRobot;
-use crate::robot::{GroupState, Joint, Kinematics, Semantics};
+use crate::robot::{GroupState, Joint, Kinematics, Semantics, counted};
 use crate::scene::{Geometry, Robot};
 
 /// A robot as it would be loaded.
@@ -127,12 +127,12 @@ impl Report {
         }
         writeln!(
             out,
-            "robot {}: {} links with geometry, {} frames, {} joint values; {} pairs of links are checked, {} may touch",
+            "robot {}: {}, {}, {}; {}, {} may touch",
             self.robot,
-            self.links.len(),
-            self.frames,
-            self.width,
-            self.checked_pairs,
+            counted(self.links.len(), "link with geometry", "links with geometry"),
+            counted(self.frames, "frame", "frames"),
+            counted(self.width, "joint value", "joint values"),
+            counted(self.checked_pairs, "pair of links is checked", "pairs of links are checked"),
             self.allowed_pairs
         )?;
         let state = match self.created {

@@ -7,6 +7,7 @@ use tonic::Status;
 
 use super::request::request;
 use crate::jobs;
+use crate::robot::counted;
 use crate::service::blobs::Blobs;
 use crate::service::error::{Invalid, at_most};
 use crate::service::limits::{MAX_FIT_POINTS, MAX_FIT_TRIANGLES};
@@ -40,7 +41,8 @@ pub(super) fn job(mut message: CreateFitRequest, blobs: &Blobs) -> Result<NewJob
     // Copies to both sides give a volume to any number of points.
     let least = if request.mode.preparation().min_thickness_m.is_some() { 1 } else { 4 };
     if !(least..=MAX_FIT_POINTS).contains(&points.len()) {
-        let why = format!("has {} points; this fit takes {least} to {MAX_FIT_POINTS}", points.len());
+        let found = counted(points.len(), "point", "points");
+        let why = format!("has {found}; this fit takes {least} to {MAX_FIT_POINTS}");
         return Err(Invalid::new(field, why).into());
     }
     let is_there = |corner: &u32| usize::try_from(*corner).is_ok_and(|corner| corner < points.len());

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use sha2::{Digest, Sha256};
-use sublevel::client::{CertificateQuestion, MotionsQuestion};
+use sublevel::client::{CertificateQuestion, MotionsQuestion, RobotPlacement};
 use sublevel::scene::query::StateVerdict;
 use sublevel::store::RobotSource;
+use tonic::Code;
 
 use super::group_states::STATES;
-use super::{CUBE, ODD, ODD_SRDF, SRDF, URDF, cell, served};
+use super::{CUBE, ODD, ODD_SRDF, SRDF, URDF, at, cell, served};
 use crate::harness::{Running, run};
 
 /// The crane with its files in a folder of its own.
@@ -114,7 +115,7 @@ fn a_robot_is_fitted_within_its_gap_and_kept() {
     let table = run(&["robot", &urdf, "--out", &out, "--max-gap", "0.01"]);
     let table = String::from_utf8(table.stdout).expect("text");
     let line = table.lines().find(|line| line.starts_with("hand ")).expect("a row");
-    assert!(line.ends_with("kept") && table.contains("4 links with geometry, 1 frames, 2 joint values"), "{table}");
+    assert!(line.ends_with("kept") && table.contains("4 links with geometry, 1 frame, 2 joint values"), "{table}");
     // The SRDF is part of what a robot is.
     assert!(table.contains("3 may touch") && !table.contains(report["id"].as_str().expect("text")), "{table}");
 
@@ -135,9 +136,13 @@ fn a_robot_is_fitted_within_its_gap_and_kept() {
     assert_eq!((&hand["source"], &hand["degree"], &hand["parts"]), (&"fitted".into(), &2.into(), &1.into()));
     // The ellipsoid of least volume around a cube of edge 0.1 is its ball of radius 0.05 √3.
     assert!((hand["gap_m"].as_f64().expect("a gap") - 0.05 * (3.0_f64.sqrt() - 1.0)).abs() < 1e-4, "{hand}");
+    // Where nothing is asked for.
+    let plain = files.load("crane.urdf", &[]);
+    let hand = row(&plain, "hand");
+    assert_eq!((&hand["source"], &hand["degree"], &hand["parts"]), (&"fitted".into(), &6.into(), &1.into()));
     files.write("hand.off", &CUBE.replace("0.1", "0.2"));
     assert_eq!(row(&files.load("crane.urdf", &["--max-gap", "1cm"]), "hand")["source"], "fitted");
-    assert_eq!(files.bodies().len(), 4);
+    assert_eq!(files.bodies().len(), 5);
     assert_eq!(std::fs::read_to_string(body).expect("a file"), before);
 }
 
@@ -305,7 +310,7 @@ fn pairs_of_links_are_held_against_the_srdf() {
     let table = String::from_utf8(table.stdout).expect("text");
     let line = table.lines().find(|line| line.starts_with("the SRDF leaves out post and hand")).expect("a line");
     assert!(line.contains("so do the hulls") && line.contains("lift "), "{line}");
-    assert!(table.contains("SRDF, Never: 1 pairs, 0 proven, 0 neighbours, 1 can touch"), "{table}");
+    assert!(table.contains("SRDF, Never: 1 pair, 0 proven, 0 neighbours, 1 can touch"), "{table}");
 }
 
 /// The parts of a certificate as it is written: claim, path, records.
@@ -403,6 +408,27 @@ async fn certificates_of_motions_are_verified() {
     let (_, after) = normal.split_once(',').expect("three numbers");
     let turned = format!("{before}\"normal\":[0.123,{after}");
     is_refused(&signed(format, [claim, path, &turned]), "records[0]");
+    // A server says the same.
+    for (text, reason) in [
+        (text.replacen("-1.5", "-1.6", 1), "digest"),
+        (text[..text.len() / 2].to_owned(), "no motion certificate: EOF"),
+        (signed(format, [claim, path, &less]), "not proven to keep apart on all of segment 1"),
+        (signed(format, [claim, path, "[]"]), "more pairs count than there are records"),
+        (signed(format, [&wider, path, records]), "does not prove that its pair keeps apart"),
+        (signed(format, [claim, &farther, records]), "does not prove that its pair keeps apart"),
+        (signed(format, [claim, &beyond, records]), "limits"),
+        (signed(format, [claim, path, &turned]), "records[0]"),
+    ] {
+        let said = match client.verify_motion(CertificateQuestion::new(text)).await {
+            Ok(checked) => checked.proof.expect_err(reason),
+            Err(error) => {
+                let expected = (Some(Code::InvalidArgument), Some("certificate"));
+                assert_eq!((error.code(), error.field().as_deref()), expected, "{error}");
+                error.to_string()
+            }
+        };
+        assert!(said.contains(reason), "{said}");
+    }
     // What is claimed about less is true as well: a smaller margin.
     let narrower = changed(claim, "\"margin_m\":0.01", "\"margin_m\":0.005");
     let (code, out, said) = verified(dir.path(), &signed(format, [&narrower, path, records]), &["--json"]);
@@ -411,4 +437,37 @@ async fn certificates_of_motions_are_verified() {
     // What is about bodies only is refused.
     let (code, _, said) = verified(dir.path(), &text, &["--contains", "body.json"]);
     assert!(code == Some(1) && said.contains("leave them out"), "{code:?} {said}");
+}
+
+/// One link with geometry, which turns on its spot.
+const LONE: &str = r#"<robot name="lone">
+  <link name="foot"/>
+  <link name="head"><collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+  <joint name="turn" type="continuous"><parent link="foot"/><child link="head"/><axis xyz="0 1 0"/></joint>
+</robot>"#;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_counted_once_is_singular() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (urdf, out) = (dir.path().join("lone.urdf"), dir.path().join("links"));
+    std::fs::write(&urdf, LONE).expect("written");
+    let table = run(&["robot", urdf.to_str().expect("text"), "--out", out.to_str().expect("text")]);
+    let table = String::from_utf8(table.stdout).expect("text");
+    let line = "robot lone: 1 link with geometry, 1 frame, 1 joint value; 0 pairs of links are checked, 0 may touch";
+    assert!(table.lines().any(|found| found == line), "{table}");
+    let server = Running::start(&dir.path().join("data"));
+    let client = server.client().await;
+    let source = RobotSource { urdf: LONE.into(), ..RobotSource::default() };
+    let robot = client.load_robot(&source).await.expect("loaded");
+    client.create_scene("room").await.expect("made");
+    client.place_robot("room", &RobotPlacement::new("one", &robot)).await.expect("placed");
+    let ball = client.create_ball("ball", 0.05).await.expect("a ball");
+    client.put_objects("room", [("ball", &ball, at(1.0, 0.0, 0.0))]).await.expect("placed");
+    let question = MotionsQuestion::of_robot("one", []).with_path([&[0.0][..], &[0.1]]).with_certificates();
+    let found = client.check_motions("room", question).await.expect("answered");
+    let certificate = found.motions[0].certificate.clone().expect("a certificate");
+    let (code, said, _) = verified(dir.path(), &certificate, &[]);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("all of its path of 1 segment\n1 pair keeps at least 0.8"), "{said}");
+    assert!(said.ends_with(" m, by 1 configuration\n"), "{said}");
 }

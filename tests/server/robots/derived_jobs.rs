@@ -383,3 +383,48 @@ async fn bad_searches_are_refused_by_field_and_make_no_job() {
     assert!(status.message().contains(&nobody), "{}", status.message());
     assert_eq!(clients.search_jobs().await.len(), 0);
 }
+
+/// Balls 1 m apart that do not move, with names as long as names may be.
+fn fence(balls: usize) -> String {
+    let link = |index: usize| {
+        let geometry = "<collision><geometry><sphere radius=\"0.1\"/></geometry></collision>";
+        format!("<link name=\"{index:0>128}\">{geometry}</link>")
+    };
+    let joint = |index: usize| {
+        format!(
+            "<joint name=\"{index}\" type=\"fixed\"><parent link=\"{:0>128}\"/><child link=\"{index:0>128}\"/>\
+             <origin xyz=\"{index} 0 0\"/></joint>",
+            0
+        )
+    };
+    let (links, joints): (String, String) = ((0..balls).map(link).collect(), (1..balls).map(joint).collect());
+    format!("<robot name=\"fence\">{links}{joints}</robot>")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn searches_whose_result_fits_no_message_are_refused() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let server = Running::start(dir.path());
+    let (client, mut clients) = (server.client().await, server.connect().await);
+    // A reason of a pair is as long as one likes.
+    let reason = "x".repeat(3_900_000);
+    let long = format!(
+        "<robot name=\"fence\"><disable_collisions link1=\"{:0>128}\" link2=\"{:0>128}\" reason=\"{reason}\"/></robot>",
+        1, 2
+    );
+    for (balls, srdf) in [(175, String::new()), (100, long)] {
+        let source = RobotSource { urdf: fence(balls), srdf, ..RobotSource::default() };
+        let robot = client.load_robot(&source).await.expect("a robot").id.to_string();
+        let refused = clients.create_search(Search { robot_id: robot, ..Search::default() }).await.expect_err("large");
+        assert_eq!((refused.code(), field(&refused).as_str()), (Code::InvalidArgument, "robot_id"), "{refused:?}");
+        assert!(refused.message().contains("fit no message"), "{}", refused.message());
+    }
+    assert_eq!(clients.search_jobs().await.len(), 0);
+    // Almost as many are searched, and what was found arrives.
+    let source = RobotSource { urdf: fence(160), ..RobotSource::default() };
+    let robot = client.load_robot(&source).await.expect("a robot").id.to_string();
+    let id = clients.queue_search(Search { robot_id: robot, ..Search::default() }).await;
+    let done = clients.searched(&id).await;
+    let of_class = |class: PairClass| done.result().pairs.iter().filter(|pair| pair.class() == class).count();
+    assert_eq!([of_class(PairClass::Adjacent), of_class(PairClass::Never)], [159, 159 * 158 / 2]);
+}

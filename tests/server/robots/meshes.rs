@@ -7,6 +7,7 @@ use sublevel::scene::NamedJointValues;
 use sublevel::scene::query::{Measure, StateVerdict};
 use sublevel::service::proto::fit_mesh::Content;
 use sublevel::service::proto::{FitMesh, LinkMesh, LoadRobotRequest, MeshFormat};
+use tonic::Code;
 
 use super::{CUBE, SRDF, URDF, at, served};
 
@@ -27,7 +28,7 @@ async fn a_link_is_fitted_within_its_gap_and_to_the_same_body_again() {
     let first = client.load_robot_with(asked.clone()).await.expect("loaded");
     let hand = first.links.iter().find(|link| &*link.name == "hand").expect("a hand");
     let (body, gap) = (hand.body.expect("a body"), hand.gap_m.expect("a gap"));
-    assert!((0.0..=0.02).contains(&gap), "{gap}");
+    assert!(gap > 0.0 && gap.is_finite(), "{gap}");
     let again = client.load_robot_with(asked.clone()).await.expect("loaded");
     assert_eq!((again.id, again.created), (first.id, false));
     // The same file as a blob.
@@ -62,7 +63,7 @@ async fn mirrored_and_scaled_meshes_are_where_they_should_be() {
     let meshes = vec![mesh("wedge.off", MeshFormat::Off, WEDGE)];
     let robot = client.load_robot_with(load(MIRRORED, "", meshes)).await.expect("loaded");
     let gap = robot.links[1].gap_m.expect("a gap");
-    assert!((0.0..=0.02).contains(&gap), "{gap}");
+    assert!(gap > 0.0 && gap.is_finite(), "{gap}");
     client.create_scene("room").await.expect("made");
     client.place_robot("room", &RobotPlacement::new("robot", &robot)).await.expect("placed");
     let ball = client.create_ball("ball", 0.05).await.expect("a ball");
@@ -89,6 +90,29 @@ async fn mirrored_and_scaled_meshes_are_where_they_should_be() {
         let found = client.check_states("room", ask).await.expect("answered");
         let expected = if expected_m == 0.0 { StateVerdict::Contact } else { StateVerdict::Free };
         assert_eq!(found.verdicts, [expected], "{x}, {y}, {z}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn absurd_scales_are_fitted_within_the_gap_or_refused() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, _) = served(dir.path()).await;
+    for (scale, most_m) in
+        [("1e9 1e9 1e9", 1e9), ("1e-9 1e-9 1e-9", 0.02), ("-1e-9 1 1", 0.02), ("1 1 1e-9", 0.02), ("1e9 1 1e-9", 1e9)]
+    {
+        let urdf = MIRRORED.replace("1 -1 3", scale);
+        let asked = load(&urdf, "", vec![mesh("wedge.off", MeshFormat::Off, WEDGE)]);
+        match client.load_robot_with(LoadRobotRequest { max_gap_m: Some(most_m), ..asked }).await {
+            Ok(robot) => {
+                let gap = robot.links[1].gap_m;
+                assert!(gap.is_some_and(|gap| (0.0..=most_m).contains(&gap)), "{scale}: {gap:?}");
+            }
+            Err(error) => {
+                let expected = (Some(Code::InvalidArgument), Some("meshes"));
+                assert_eq!((error.code(), error.field().as_deref()), expected, "{scale}: {error}");
+                assert!(error.to_string().contains("of link \"wedge\""), "{scale}: {error}");
+            }
+        }
     }
 }
 

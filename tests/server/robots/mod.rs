@@ -12,6 +12,7 @@ mod group_states;
 mod kept;
 mod meshes;
 mod motions;
+mod motions_refused;
 #[cfg(feature = "fit")]
 mod panda;
 mod pictures;

@@ -1,6 +1,6 @@
 //! Motions and their certificates, over the wire.
 
-use sublevel::client::{BodySource, CertificateQuestion, CheckedMotion, Client, MotionsQuestion};
+use sublevel::client::{BodySource, CertificateQuestion, CheckedMotion, Client, MotionsQuestion, StoredRobot};
 use sublevel::scene::query::StateVerdict;
 use sublevel::scene::{Attach, Subject, Update};
 use sublevel::service::proto::{
@@ -17,7 +17,11 @@ fn refused<T: std::fmt::Debug>(answer: Result<T, tonic::Status>, at: &str) {
     refused_with(answer, Code::InvalidArgument, at);
 }
 
-fn refused_with<T: std::fmt::Debug>(answer: Result<T, tonic::Status>, code: Code, at: &str) -> tonic::Status {
+pub(super) fn refused_with<T: std::fmt::Debug>(
+    answer: Result<T, tonic::Status>,
+    code: Code,
+    at: &str,
+) -> tonic::Status {
     let status = answer.expect_err(at);
     assert_eq!((status.code(), field(&status).as_str()), (code, at), "{}", status.message());
     assert!(status.message().len() > 20, "{}", status.message());
@@ -244,6 +248,29 @@ async fn searches_that_may_not_look_closer_leave_paths_undecided() {
     assert!(motion.certificate.is_none());
 }
 
+#[tokio::test(flavor = "multi_thread")]
+async fn the_resolution_is_how_far_anything_moves_in_metres() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (_server, client, _clients, robot) = served(dir.path()).await;
+    cell(&client, &robot).await;
+    // What is held reaches 1.35 m from the joint and meets the ball on its way.
+    let put = Update { poses: vec![("post".into(), at(1.3, 0.0, 0.3))], ..Update::default() };
+    client.update_scene("cell", &put).await.expect("moved");
+    for resolution_m in [1e-2, 1e-3, 1e-4, 1e-5] {
+        let mut question = MotionsQuestion::of_robot("one", ["lift"]).with_path([&[0.0][..], &[QUARTER]]);
+        let request = question.request_mut();
+        (request.first_contact, request.resolution_m) = (true, Some(resolution_m));
+        let found = client.check_motions("cell", question).await.expect("answered");
+        let motion = &found.motions[0];
+        let (_, s) = motion.contact.clone().expect("a contact");
+        // Intervals are halved until nothing moves farther than that from their middle: they are
+        // not more than twice too short. Three half intervals may lie between what is proven free
+        // and the contact, some more where bounds are not sharp.
+        let between_m = (s - motion.alpha) * QUARTER * 1.35;
+        assert!(between_m > 0.49 * resolution_m && between_m < 5.0 * resolution_m, "{resolution_m}: {between_m}");
+    }
+}
+
 /// A base that drives about, of a kind of joint with several values, and an arm on it that turns.
 const CART: &str = r#"<robot name="cart">
   <link name="floor"/>
@@ -255,13 +282,14 @@ const CART: &str = r#"<robot name="cart">
 </robot>"#;
 
 /// A scene with the name of a kind of joint: the cart at the origin, and a ball at x = 1 m.
-async fn yard(client: &Client, kind: &str) {
+pub(super) async fn yard(client: &Client, kind: &str) -> StoredRobot {
     let source = RobotSource { urdf: CART.replace("KIND", kind), ..RobotSource::default() };
     let robot = client.load_robot(&source).await.expect("loaded");
     client.create_scene(kind).await.expect("made");
     client.place_robot(kind, &placement(&robot, "cart", 0.0)).await.expect("placed");
     let thing = client.create_ball("thing", 0.05).await.expect("a ball");
     client.put_objects(kind, [("post", &thing, at(1.0, 0.0, 0.0))]).await.expect("placed");
+    robot
 }
 
 #[tokio::test(flavor = "multi_thread")]

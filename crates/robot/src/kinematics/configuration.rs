@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Kinematics;
+use crate::counted;
 use crate::description::JointKind;
 
 /// How far a quaternion may be from unit length; poses take no more either.
@@ -16,7 +17,7 @@ pub(crate) const LIMIT_SLACK: f64 = 1e-9;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigurationError {
     /// The wrong number of values.
-    #[error("holds {given} values; this robot takes {width}")]
+    #[error("holds {}; this robot takes {width}", counted(*given, "value", "values"))]
     Width {
         /// How many were given.
         given: usize,

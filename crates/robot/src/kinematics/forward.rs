@@ -15,6 +15,21 @@ use crate::description::JointKind;
 /// Bound of the error that computing one joint adds, per metre of the way from it to a point.
 const ROUNDING: f64 = 128.0 * f64::EPSILON;
 
+/// Bound of the error of the pose of a link: no point within r metres of its origin is farther than
+/// `at_origin_m + per_metre r` from where exact arithmetic on the same numbers puts it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct PlaceError {
+    at_origin_m: f64,
+    per_metre: f64,
+}
+
+impl PlaceError {
+    /// Of points within `reach_m` of the origin of the link, metres.
+    pub fn within_m(&self, reach_m: f64) -> f64 {
+        self.at_origin_m + self.per_metre * reach_m
+    }
+}
+
 impl Kinematics {
     /// Poses of all links in the order of [`Kinematics::links`], link frame to world frame, metres.
     /// `base` is the pose of the root link, `configuration` packed values of
@@ -31,33 +46,38 @@ impl Kinematics {
         }
     }
 
-    /// Bound of the error of [`Kinematics::forward`] at points of a link, metres: no point within
-    /// `reach_m` of the origin of the link is farther than this from where exact arithmetic on the
-    /// same numbers puts it.
+    /// Bounds of the errors of [`Kinematics::forward`] for the poses that it has given, in the order
+    /// of [`Kinematics::links`].
+    ///
+    /// A joint that turns by δ too much moves a point by δ times the way to it, which is at most as
+    /// long as the links between them and the way from the origin of the last one: the sum over
+    /// all joints is linear in that, and each link continues those of its parent.
     ///
     /// # Panics
-    /// When the poses are not those of this tree, or the link is none of it.
-    pub fn forward_error_m(&self, poses: &[Isometry3<f64>], configuration: &[f64], link: usize, reach_m: f64) -> f64 {
-        // Length of the way from the joint to the point.
-        let (mut path, mut error, mut at) = (reach_m, 0.0, link);
-        while at > 0 {
-            let joint = &self.joints[at - 1];
-            let origin = &poses[at].translation.vector;
+    /// When the poses are not those of this tree.
+    pub fn forward_errors(&self, poses: &[Isometry3<f64>], configuration: &[f64], errors: &mut Vec<PlaceError>) {
+        errors.clear();
+        errors.push(PlaceError::default());
+        for (joint, pose) in self.joints.iter().zip(&poses[1..]) {
+            let (origin, before) = (&pose.translation.vector, &poses[joint.parent].translation.vector);
             // Translations that cancel are rounded as what they are, not as what is left of them.
-            let before = poses[joint.parent].translation.vector.norm();
-            error += ROUNDING * (path + origin.norm() + before + joint.translation.norm());
+            let size = origin.norm() + before.norm() + joint.translation.norm();
+            let (mut at_origin_m, mut per_metre) = (ROUNDING * size, ROUNDING);
             if let Some((multiplier, offset)) = joint.mimic {
-                let size = (multiplier * configuration[joint.first]).abs() + offset.abs();
-                error += f64::EPSILON * size * if joint.kind == JointKind::Prismatic { 1.0 } else { path };
+                let value = f64::EPSILON * ((multiplier * configuration[joint.first]).abs() + offset.abs());
+                let is_length = joint.kind == JointKind::Prismatic;
+                *(if is_length { &mut at_origin_m } else { &mut per_metre }) += value;
             }
             if matches!(joint.kind, JointKind::Prismatic | JointKind::Planar | JointKind::Floating) {
                 let shift = configuration[joint.first..].iter().take(3).map(|value| value.abs()).sum::<f64>();
-                error += ROUNDING * joint.rate().abs().max(1.0) * shift;
+                at_origin_m += ROUNDING * joint.rate().abs().max(1.0) * shift;
             }
-            path += (origin - poses[joint.parent].translation.vector).norm();
-            at = joint.parent;
+            let parent = errors[joint.parent];
+            errors.push(PlaceError {
+                at_origin_m: at_origin_m + parent.within_m((origin - before).norm()),
+                per_metre: per_metre + parent.per_metre,
+            });
         }
-        error
     }
 }
 

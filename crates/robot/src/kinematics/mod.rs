@@ -13,4 +13,5 @@ mod tree;
 
 pub use configuration::ConfigurationError;
 pub(crate) use configuration::LIMIT_SLACK;
+pub use forward::PlaceError;
 pub use tree::{Kinematics, KinematicsError, Variable};

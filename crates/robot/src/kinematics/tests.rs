@@ -100,12 +100,14 @@ fn poses_are_products_of_matrices_within_the_bound() {
         let base = Isometry3::from_parts(Translation3::from(vector(&mut seeded)), rotation(&mut seeded));
         let mut poses = Vec::new();
         kinematics.forward(&base, &values, &mut poses);
+        let mut errors = Vec::new();
+        kinematics.forward_errors(&poses, &values, &mut errors);
         for link in 0..description.links.len() {
             let place = kinematics.link(&format!("link{link}")).expect("the link");
             let point = vector(&mut seeded);
             let expected = by_matrices(&description, &kinematics, &values, &base, link).transform_point(&point.into());
             let error = ((poses[place] * nalgebra::Point3::from(point)) - expected).norm();
-            let bound = kinematics.forward_error_m(&poses, &values, place, point.norm());
+            let bound = errors[place].within_m(point.norm());
             // The matrices are rounded, too; the bound covers both, since it counts twice.
             assert!(error <= bound + 1e-15, "seed {seed}, link {link}: {error:e} > {bound:e}");
             assert!(bound < 1e-11, "seed {seed}: {bound:e}");

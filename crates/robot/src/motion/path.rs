@@ -2,6 +2,7 @@
 
 use super::interval::Interval;
 use super::screw::Screw;
+use crate::counted;
 use crate::description::JointKind;
 use crate::kinematics::Kinematics;
 use serde::{Deserialize, Serialize};
@@ -33,7 +34,7 @@ pub struct Path {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PathError {
     /// Numbers that are not whole configurations.
-    #[error("holds {numbers} numbers, which is no multiple of the {width} values of a configuration")]
+    #[error("holds {}, which is no multiple of {width}, what a configuration takes", counted(*numbers, "number", "numbers"))]
     Numbers {
         /// How many there are.
         numbers: usize,
@@ -41,7 +42,7 @@ pub enum PathError {
         width: usize,
     },
     /// Too few configurations.
-    #[error("holds {0} configurations; a path has at least 2")]
+    #[error("holds {}; a path has at least 2", counted(*.0, "configuration", "configurations"))]
     Few(usize),
     /// Too many configurations.
     #[error("holds {given} configurations; at most {most} are allowed")]

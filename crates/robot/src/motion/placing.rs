@@ -8,6 +8,7 @@ use super::geometry::{MotionItem, PlacedObstacle};
 use super::interval::Interval;
 use super::path::Path;
 use super::problem::{MotionProblem, PiecePair, motion, motion_bound_m, world};
+use crate::kinematics::PlaceError;
 
 /// Bound of the rounding of the pose of a body on its link, relative to the lengths.
 const PLACING_ROUNDING: f64 = 64.0 * f64::EPSILON;
@@ -25,6 +26,7 @@ pub(crate) struct Placing {
     deviations: Vec<f64>,
     /// Poses of links.
     links: Vec<Isometry3<f64>>,
+    errors: Vec<PlaceError>,
     moves: Moves,
     pieces: Vec<PlacedPiece>,
     /// Of all placed pieces; each knows where its own are.
@@ -84,6 +86,7 @@ impl Placing {
         self.pieces.resize(problem.pieces.len(), unplaced);
         self.displacements.clear();
         problem.kinematics.forward(&problem.base, &self.configuration, &mut self.links);
+        problem.kinematics.forward_errors(&self.links, &self.configuration, &mut self.errors);
         self.moves.set(&problem.kinematics, &self.links, &self.deviations);
     }
 
@@ -131,7 +134,7 @@ impl Placing {
         let translation = world(frame, place.translation());
         let pose = Pose::from_quaternion(translation, rotation.coords.into()).ok()?;
         let reach = center.norm() + radius;
-        let error_m = problem.kinematics.forward_error_m(&self.links, &self.configuration, link, reach)
+        let error_m = self.errors[link].within_m(reach)
             + PLACING_ROUNDING * (frame.translation.vector.norm() + reach + place.translation().norm());
         let ball = MovedBall { center: world(frame, center), radius: radius + error_m, link };
         Some(PlacedPiece { stamp: NEVER, pose, ball, first: 0, drift_m: 0.0, error_m })

@@ -51,8 +51,8 @@ pub enum MotionProblemError {
     Obstacle(Arc<str>),
     /// More pairs than are kept in memory.
     #[error(
-        "{0} pairs of convex pieces count, and at most {MAX_PIECE_PAIRS} are taken; allow pairs that cannot touch, \
-         or use bodies of fewer parts"
+        "at least {0} pairs of convex pieces count, and at most {MAX_PIECE_PAIRS} are taken; allow pairs that cannot \
+         touch, or use bodies of fewer parts"
     )]
     Pairs(usize),
 }
@@ -95,12 +95,22 @@ impl MotionProblem {
         margin_m: f64,
         mut padding_m: impl FnMut(MotionItem, MotionItem) -> Option<f64>,
     ) -> Result<Self, MotionProblemError> {
-        let mut rules = Vec::new();
+        let (mut rules, mut pairs) = (Vec::new(), 0);
         let count = robot.bodies.len();
         for a in 0..count {
             let others = (a + 1..count).map(MotionItem::Body);
             for b in others.chain((0..obstacles.len()).map(MotionItem::Obstacle)) {
-                rules.extend(padding_m(MotionItem::Body(a), b).map(|padding_m| (MotionItem::Body(a), b, padding_m)));
+                let Some(padding_m) = padding_m(MotionItem::Body(a), b) else { continue };
+                let pieces = match b {
+                    MotionItem::Body(b) => robot.bodies[b].shape.pieces(),
+                    MotionItem::Obstacle(b) => obstacles[b].placed.pieces(),
+                };
+                pairs += robot.bodies[a].shape.pieces() * pieces;
+                // Rules of many items take more memory than there is.
+                if pairs > MAX_PIECE_PAIRS {
+                    return Err(MotionProblemError::Pairs(pairs));
+                }
+                rules.push((MotionItem::Body(a), b, padding_m));
             }
         }
         Self::of_rules(robot, obstacles, margin_m, rules)

@@ -30,8 +30,15 @@ pub const DEFAULT_MAX_CONFIGURATIONS: u32 = 100_000;
 /// are halved all the same.
 const HOPELESS: f64 = 4.0;
 
-/// Most open pairs of all intervals that wait; more end the search early.
+/// Most open pairs of all intervals that wait, each interval counted as [`INTERVAL_PAIRS`] more;
+/// more end the search early.
 const MAX_WAITING_PAIRS: usize = 1 << 24;
+
+/// Open pairs that take as much memory as an interval that waits.
+const INTERVAL_PAIRS: usize = 20;
+
+/// Most records of a certificate, tens of megabytes; more end the search early.
+const MAX_RECORDS: usize = 1 << 18;
 
 /// Lists that are kept for the next search.
 const MAX_SPARE: usize = 64;
@@ -144,7 +151,7 @@ struct Search<'a, 'b> {
     nearest: f64,
     configurations: u32,
     solved: u32,
-    /// Open pairs of all intervals in the queue.
+    /// Open pairs of all intervals in the queue, and what these take themselves.
     waiting: usize,
     records: Vec<Record>,
 }
@@ -162,12 +169,12 @@ impl Search<'_, '_> {
         // Wide intervals first: a contact is seen early, and what lies beyond it need not be
         // proven.
         while let Some((interval, pairs)) = self.workspace.queue.pop_front() {
-            self.waiting -= pairs.as_ref().map_or(0, Vec::len);
+            self.waiting -= pairs.as_ref().map_or(0, |open| open.len() + INTERVAL_PAIRS);
             if self.is_beyond_contact(&interval) {
                 self.workspace.spare.extend(pairs);
                 continue;
             }
-            let is_full = self.waiting > MAX_WAITING_PAIRS;
+            let is_full = self.waiting > MAX_WAITING_PAIRS || self.records.len() > MAX_RECORDS;
             if self.configurations >= self.options.max_configurations || is_full || self.is_stopped() {
                 self.workspace.queue.push_front((interval, pairs));
                 ended_early = true;
@@ -254,7 +261,7 @@ impl Search<'_, '_> {
             Some([left, right]) => {
                 let mut same = self.workspace.spare.pop().unwrap_or_default();
                 same.clone_from(&open);
-                self.waiting += 2 * open.len();
+                self.waiting += 2 * (open.len() + INTERVAL_PAIRS);
                 self.workspace.queue.push_back((left, Some(open)));
                 self.workspace.queue.push_back((right, Some(same)));
             }

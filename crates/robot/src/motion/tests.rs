@@ -407,6 +407,52 @@ fn searches_end_when_they_have_to() {
     assert!(found.contact.is_some_and(|open| open.lower_m > 0.0 && open.s > 0.2 && open.s < 0.8));
 }
 
+#[test]
+fn certificates_that_grow_too_long_end_the_search() {
+    // The hand goes round a ball at the origin. At 0.4 µm from the clearance that is known a ball
+    // of 0.1 m may turn by 4 µrad at most: half a million intervals in 3 rad.
+    let problem = problem(hand(ball(0.1)), vec![still("post", ball(0.2), Pose::identity())], 0.0);
+    let path = edge(&problem, &[0.0, 0.0, 0.0], &[0.0, 3.0, 0.0]);
+    let precise = MotionOptions { clearance_accuracy_m: Some(4e-7), max_configurations: 1 << 24, ..FIRST };
+    let free = prove(&problem, &path, &precise);
+    assert!(free.verdict == MotionVerdict::Free && !free.ended_early, "{free:?}");
+    assert!(free.configurations > 1 << 19, "{}", free.configurations);
+    let found = prove(&problem, &path, &MotionOptions { certificate: true, ..precise });
+    assert!(found.ended_early && found.verdict == MotionVerdict::Undecided && found.certificate.is_none());
+}
+
+#[test]
+fn too_many_pairs_are_refused_before_they_are_listed() {
+    let part = |index: i32| Body::ball("part", Vector3::x() * 0.3 * f64::from(index), 0.1).expect("a ball");
+    let row = Compound::new("row", (0..16).map(part).collect()).expect("a compound");
+    let row = MotionShape::Solid(Arc::new(Shape::Compound(Box::new(row))));
+    let bodies = |count: usize| {
+        let body = |index: usize| MotionBody {
+            name: format!("{index}").into(),
+            link: 3,
+            place: Pose::identity(),
+            shape: row.clone(),
+        };
+        (0..count).map(body).collect::<Vec<_>>()
+    };
+    // Two bodies make 256 pairs of pieces: one pair of bodies more than are taken.
+    let most = MAX_PIECE_PAIRS / 256;
+    let mut asked = 0;
+    let refused = MotionProblem::new(of_arm(bodies(300)), Vec::new(), 0.0, |_, _| {
+        asked += 1;
+        Some(0.0)
+    });
+    assert_eq!(refused.map(|_| ()), Err(MotionProblemError::Pairs(256 * (most + 1))));
+    assert_eq!(asked, most + 1);
+    // Those that may touch do not count.
+    let mut counted = 0;
+    let taken = MotionProblem::new(of_arm(bodies(300)), Vec::new(), 0.0, |_, _| {
+        counted += 1;
+        (counted % 4000 == 0).then_some(0.0)
+    });
+    assert_eq!((counted, taken.map(|problem| problem.pairs.len())), (150 * 299, Ok(256 * 11)));
+}
+
 /// What keeps an egg apart from a cylinder that it goes past.
 fn past_a_cylinder() -> (MotionProblem, Certificate) {
     let cylinder = solid(Body::cylinder("cylinder", 0.2, 0.5).expect("a cylinder"));

@@ -85,8 +85,8 @@ impl Certificate {
                 let reason = "there is no such pair or interval".to_owned();
                 return Err(CertificateError::Part { part: format!("records[{index}]"), reason });
             };
+            options.check_time()?;
             if at != Some(record.interval) {
-                options.check_time()?;
                 placing.set(problem, &self.path, &record.interval);
                 at = Some(record.interval);
                 configurations += 1;

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 
 use super::robot::{Named, Robot, unknown};
 use super::warnings::Warnings;
+use crate::counted;
 use crate::error::DescriptionError;
 use crate::semantics::{Group, GroupState, JointValues, VirtualJoint};
 use crate::xml::{Element, Vocabulary, quoted};
@@ -85,7 +86,8 @@ impl Reader<'_> {
             return Ok(None);
         }
         if values.len() != width {
-            let problem = format!("value holds {} numbers, and the joint {name} takes {width}", values.len());
+            let holds = counted(values.len(), "number", "numbers");
+            let problem = format!("value holds {holds}, and the joint {name} takes {width}");
             return Err(element.attribute_error("value", problem, "write one number for each value of the joint"));
         }
         self.warn_of_limits(element, named, &values);

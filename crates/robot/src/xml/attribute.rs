@@ -2,6 +2,7 @@
 
 use super::Element;
 use super::text::quoted;
+use crate::counted;
 use crate::error::DescriptionError;
 
 /// Most bytes of a name.
@@ -48,7 +49,7 @@ impl<'a> Element<'a, '_> {
         let numbers = self.number_list(name)?;
         let count = numbers.len();
         numbers.try_into().map(Some).map_err(|_| {
-            let (holds, needs) = (counted(count), counted(N));
+            let [holds, needs] = [count, N].map(|count| counted(count, "number", "numbers"));
             self.attribute_error(name, format!("{name} holds {holds}, not {N}"), format!("write {needs}"))
         })
     }
@@ -89,8 +90,4 @@ impl<'a> Element<'a, '_> {
             }
         }
     }
-}
-
-fn counted(count: usize) -> String {
-    if count == 1 { "1 number".into() } else { format!("{count} numbers") }
 }

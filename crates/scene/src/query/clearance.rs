@@ -163,9 +163,7 @@ impl Clearance {
             // there.
             let stands = matches!(other, Other::Standing(_));
             if stands && threshold >= 0.0 && LanePair::of(&a, &b).is_some() {
-                if a.box_gap_m(&b) <= threshold + slack_m {
-                    batches.push((index, other_slot), Near { place, pose: at.poses[index], threshold, slack_m });
-                }
+                batches.push((index, other_slot), Near { place, pose: at.poses[index], threshold, slack_m });
                 return true;
             }
             let pair = Pair { a, b, slots: Some(PairSlots { a: slot, b: other_slot }) };

@@ -7,6 +7,7 @@
 //! where poses are rounded. The questions are in files of their own.
 
 mod answer;
+mod around;
 mod ask;
 mod candidates;
 mod capsules;

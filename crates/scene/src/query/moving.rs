@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use sublevel_core::body::Ball;
 use sublevel_core::measure::Pose;
 
-use crate::broad_phase::{WorldBall, world_ball};
 use crate::object::{Object, Slot};
 
 /// An object that every state places.
@@ -13,8 +11,6 @@ use crate::object::{Object, Slot};
 pub(crate) struct Moving {
     pub(crate) slot: Slot,
     pub(crate) object: Arc<Object>,
-    /// A ball around it in its own frame, metres; none around a half-space.
-    ball: Option<Ball>,
     /// Position of what holds it among the moving, and its place there; none if it is named.
     pub(crate) holder: Option<(usize, Pose)>,
     /// Of states of a robot: the link that it moves with.
@@ -31,8 +27,8 @@ impl Moving {
     /// An object that states place by itself.
     pub(crate) fn named(slot: Slot, object: &Arc<Object>) -> Self {
         let link = object.link.as_ref().map(|of| of.link);
-        let (ball, reach_m) = (object.ball(), reach_m(object, 0.0));
-        Self { slot, object: object.clone(), ball, holder: None, link, way_m: 0.0, reach_m, holders: 0 }
+        let reach_m = reach_m(object, 0.0);
+        Self { slot, object: object.clone(), holder: None, link, way_m: 0.0, reach_m, holders: 0 }
     }
 
     /// An object that another one holds, which is given with its position.
@@ -40,13 +36,7 @@ impl Moving {
         let way_m = holder.way_m + place.translation().norm();
         let reach_m = reach_m(object, way_m);
         let (link, holders) = (holder.link, holder.holders + 1);
-        let (object, ball) = (object.clone(), object.ball());
-        Self { slot, object, ball, holder: Some((position, place)), link, way_m, reach_m, holders }
-    }
-
-    /// The ball around it where it stands.
-    pub(crate) fn ball(&self, pose: &Pose) -> Option<WorldBall> {
-        self.ball.map(|ball| world_ball(pose, (ball.center, ball.radius)))
+        Self { slot, object: object.clone(), holder: Some((position, place)), link, way_m, reach_m, holders }
     }
 }
 

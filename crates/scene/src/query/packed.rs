@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, Vector3};
 use sublevel_core::measure::{Pose, PoseError, Twist};
+use sublevel_robot::PlaceError;
 
+use super::around::Around;
 use super::invalid_state::InvalidState;
 use super::moving::Moving;
 use super::states_error::StatesError;
+use super::thing::Thing;
 use crate::poses::compose;
 use crate::robot::{Robot, RobotInstance, isometry, link_error_m, places, pose_of};
 
@@ -22,15 +25,23 @@ const ROUNDING: f64 = 32.0 * f64::EPSILON;
 pub(crate) struct State {
     /// World poses of all moving objects.
     pub(crate) poses: Vec<Pose>,
+    /// What contains each; none of half-spaces.
+    around: Vec<Option<Around>>,
     /// How far each may be from where exact arithmetic puts it, metres; empty: not at all.
     errors: Vec<f64>,
     /// Joint values of a robot.
     configuration: Vec<f64>,
     /// World poses of its links.
     links: Vec<Isometry3<f64>>,
+    link_errors: Vec<PlaceError>,
 }
 
 impl State {
+    /// What contains a moving object, by its position.
+    pub(crate) fn around(&self, index: usize) -> Option<&Around> {
+        self.around[index].as_ref()
+    }
+
     /// How far points of a moving object may be from where exact arithmetic puts them, metres.
     pub(crate) fn error_m(&self, index: usize) -> f64 {
         self.errors.get(index).copied().unwrap_or(0.0)
@@ -113,11 +124,13 @@ impl Packed {
             let pose = compose(&state.poses[*holder], place);
             state.poses.push(pose.map_err(|error| self.no_pose(index, (moving, at), error))?);
         }
-        if let Self::Joints(joints) = self {
-            let kinematics = joints.robot.kinematics();
+        let around = |(moving, pose): (&Moving, &Pose)| Around::new(&Thing::object(&moving.object, pose));
+        state.around.clear();
+        state.around.extend(moving.iter().zip(&state.poses).map(around));
+        if matches!(self, Self::Joints(_)) {
             for (moving, pose) in moving.iter().zip(&state.poses) {
                 let error = moving.link.map_or(f64::INFINITY, |link| {
-                    link_error_m(kinematics, &state.links, &state.configuration, link, moving.reach_m)
+                    link_error_m(&state.links[link], &state.link_errors[link], moving.reach_m)
                 });
                 let products = f64::from(moving.holders);
                 let held = products * ROUNDING * (moving.reach_m + pose.translation().norm());
@@ -163,6 +176,7 @@ impl JointStates {
         let kinematics = self.robot.kinematics();
         kinematics.check(&state.configuration)?;
         kinematics.forward(&self.base, &state.configuration, &mut state.links);
+        kinematics.forward_errors(&state.links, &state.configuration, &mut state.link_errors);
         for moving in moving.iter().take_while(|moving| moving.holder.is_none()) {
             let Some(link) = moving.link else { break };
             let pose = pose_of(&state.links[link]);

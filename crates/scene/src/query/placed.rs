@@ -5,12 +5,13 @@ use std::sync::Arc;
 
 use sublevel_core::measure::Pose;
 
+use super::around::Around;
 use super::invalid_state::InvalidState;
 use super::moving::Moving;
 use super::packed::{JointStates, POSE_NUMBERS, Packed, State};
 use super::states_error::StatesError;
-use super::thing::{Thing, ball_gap};
-use crate::broad_phase::{Tree, WorldBall, grown, world_box};
+use super::thing::Thing;
+use crate::broad_phase::{Tree, grown, world_box};
 use crate::object::Slot;
 use crate::pair_cache::PairCache;
 use crate::scene::Scene;
@@ -53,8 +54,8 @@ pub(crate) struct Placed {
 /// What stands still.
 #[derive(Debug)]
 enum Still {
-    /// Few: all of them, with their balls; none around half-spaces.
-    Few(Vec<(Slot, Option<WorldBall>)>),
+    /// Few: all of them, with what contains them.
+    Few(Vec<(Slot, Option<Around>)>),
     /// Many: the tree, and which of its leaves move.
     Many(Arc<Tree>, HashMap<Slot, usize>),
 }
@@ -116,7 +117,7 @@ impl Placed {
         let standing = scene.len() - moving.len();
         let still = if standing <= FEW {
             let others = scene.objects().filter(|(slot, _, _)| !places.contains_key(slot));
-            Still::Few(others.map(|(slot, object, pose)| (slot, Thing::object(object, pose).ball())).collect())
+            Still::Few(others.map(|(slot, object, pose)| (slot, Around::new(&Thing::object(object, pose)))).collect())
         } else {
             Still::Many(scene.tree().clone(), places)
         };
@@ -171,38 +172,40 @@ impl Placed {
     pub(crate) fn visit(&self, state: &State, margin_m: f64, mut visit: impl FnMut(Candidate) -> bool) {
         let table = &self.scene.structure.table;
         let counts = |a: Slot, b: Slot| self.include_allowed || !table.is_allowed(a, b);
-        let balls: Vec<_> = self.moving.iter().zip(&state.poses).map(|(moving, pose)| moving.ball(pose)).collect();
         for (i, moving) in self.moving.iter().enumerate() {
+            let around = state.around(i);
             let (slot, error_m) = (moving.slot, state.error_m(i));
             for (j, other) in self.moving.iter().enumerate().skip(i + 1) {
                 let threshold = margin_m + table.padding_m(slot, other.slot);
                 let slack_m = error_m + state.error_m(j);
-                if near(&balls[i], &balls[j], threshold + slack_m)
-                    && counts(slot, other.slot)
-                    && !visit(Candidate { index: i, other: Other::Moving(j), threshold, slack_m })
-                {
+                let pair = Candidate { index: i, other: Other::Moving(j), threshold, slack_m };
+                let both = (around, state.around(j));
+                if may_be_within(both, threshold + slack_m, || counts(slot, other.slot)) && !visit(pair) {
                     return;
                 }
             }
             match &self.still {
                 Still::Few(others) => {
-                    for (other, ball) in others {
+                    for (other, around_other) in others {
                         let threshold = margin_m + table.padding_m(slot, *other);
                         let pair = Candidate { index: i, other: Other::Standing(*other), threshold, slack_m: error_m };
-                        if near(&balls[i], ball, threshold + error_m) && counts(slot, *other) && !visit(pair) {
+                        let both = (around, around_other.as_ref());
+                        if may_be_within(both, threshold + error_m, || counts(slot, *other)) && !visit(pair) {
                             return;
                         }
                     }
                 }
                 Still::Many(tree, places) => {
                     let reach = margin_m + table.largest_padding_m() + error_m;
-                    let around = world_box(&moving.object, &state.poses[i]).map(|around| grown(&around, reach));
-                    let met = around.iter().flat_map(|around| tree.meeting(around));
+                    let bounds = world_box(&moving.object, &state.poses[i]).map(|bounds| grown(&bounds, reach));
+                    let met = bounds.iter().flat_map(|bounds| tree.meeting(bounds));
                     let half_spaces = self.scene.structure.half_spaces.iter().copied();
                     for other in met.chain(half_spaces).filter(|other| !places.contains_key(other)) {
                         let threshold = margin_m + table.padding_m(slot, other);
                         let pair = Candidate { index: i, other: Other::Standing(other), threshold, slack_m: error_m };
-                        if counts(slot, other) && !visit(pair) {
+                        let around_other = self.standing(other).and_then(|thing| Around::new(&thing));
+                        let both = (around, around_other.as_ref());
+                        if may_be_within(both, threshold + error_m, || counts(slot, other)) && !visit(pair) {
                             return;
                         }
                     }
@@ -233,9 +236,9 @@ pub(crate) enum Other {
     Standing(Slot),
 }
 
-fn near(a: &Option<WorldBall>, b: &Option<WorldBall>, threshold: f64) -> bool {
-    match (a, b) {
-        (Some(a), Some(b)) => ball_gap(*a, *b) <= threshold,
-        _ => true,
-    }
+/// Whether a pair that counts may be nearer than a threshold, metres; what nothing contains always
+/// may.
+fn may_be_within((a, b): (Option<&Around>, Option<&Around>), threshold: f64, counts: impl FnOnce() -> bool) -> bool {
+    let (Some(a), Some(b)) = (a, b) else { return counts() };
+    a.is_near(b, threshold) && counts() && a.may_meet(b, threshold)
 }

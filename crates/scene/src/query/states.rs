@@ -191,6 +191,8 @@ impl States {
         if let Some(contact) = *last
             && let Some((pair, slots)) = self.pair(state, contact)
         {
+            let of_other = if let Other::Moving(other) = contact.other { state.error_m(other) } else { 0.0 };
+            let contact = Candidate { slack_m: state.error_m(contact.index) + of_other, ..contact };
             let found = self.decide(solver, &pair, contact);
             answer.solved += u32::from(found.solved);
             if found.verdict == Verdict::Yes {

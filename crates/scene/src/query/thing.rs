@@ -251,14 +251,18 @@ mod tests {
     #[test]
     fn balls_and_boxes_contain_what_is_far_from_its_own_frame() {
         let (mut random, mut largest) = (Seeded(5), 0.0_f64);
-        for step in 0..2000 {
+        let mut ball = || {
             let center = random.between(1.0, 1e7) * random.unit();
+            let body = Body::ball("ball", center, 0.01).expect("a ball");
+            (center, Arc::new(Shape::Body(Box::new(body))))
+        };
+        let balls: Vec<_> = (0..200).map(|_| ball()).collect();
+        for step in 0..2000 {
+            let (center, shape) = &balls[step % 200];
             let rotation = random.rotation();
             let pose = Pose::from_quaternion(random.unit() - rotation * center, rotation.coords.into());
             let pose = pose.expect("a pose");
-            let body = Body::ball("ball", center, 0.01).expect("a ball");
-            let shape = Arc::new(Shape::Body(Box::new(body)));
-            let thing = Thing::Solid { rungs: std::slice::from_ref(&shape), pose: &pose, set: None };
+            let thing = Thing::Solid { rungs: std::slice::from_ref(shape), pose: &pose, set: None };
             let (ball, bounds) = (shape.circumscribed(), shape.bounding_box());
             let error = |computed: &Vector3<f64>, of: &Vector3<f64>| {
                 let exact = placed(&pose, of);

@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Translation3};
 use sublevel_core::measure::{Pose, PoseError};
-use sublevel_robot::Kinematics;
+use sublevel_robot::PlaceError;
 
 /// Rounding of one product of poses and one normalisation, per metre of what they move.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
@@ -24,13 +24,6 @@ pub(crate) fn pose_of(isometry: &Isometry3<f64>) -> Result<Pose, PoseError> {
 /// Bound of how far points within `reach_m` of the origin of a link are from where exact arithmetic
 /// on the joint values puts them, metres; for points of what the link holds, too, with the way to
 /// them in `reach_m`.
-pub(crate) fn link_error_m(
-    kinematics: &Kinematics,
-    links: &[Isometry3<f64>],
-    configuration: &[f64],
-    link: usize,
-    reach_m: f64,
-) -> f64 {
-    let placed = ROUNDING * (reach_m + links[link].translation.vector.norm());
-    kinematics.forward_error_m(links, configuration, link, reach_m) + placed
+pub(crate) fn link_error_m(link: &Isometry3<f64>, error: &PlaceError, reach_m: f64) -> f64 {
+    error.within_m(reach_m) + ROUNDING * (reach_m + link.translation.vector.norm())
 }

@@ -94,7 +94,7 @@ pub(crate) fn place_robots(
         let stance = Stance { base: *base, configuration, stamp: next.revision() };
         let instance = Arc::new(Instance { robot: robot.clone(), slots });
         changed.extend(instance.slots.iter().flatten());
-        for (slot, pose) in link_poses(&instance, name, &stance)? {
+        for (slot, pose) in link_poses(at, &instance, name, &stance)? {
             next.set_pose(slot, pose);
         }
         next.set_stance(name, Some(stance));
@@ -112,24 +112,24 @@ pub(crate) fn move_robots(
     joints: &[(Arc<str>, NamedJointValues)],
     bases: &[(Arc<str>, Pose)],
 ) -> Result<Vec<(Slot, Pose)>, SceneError> {
-    let mut stances: BTreeMap<&Arc<str>, (&Instance, Stance)> = BTreeMap::new();
+    let mut stances: BTreeMap<&Arc<str>, (Entry, &Instance, Stance)> = BTreeMap::new();
     for (at, (name, base)) in entries(List::Bases, bases) {
         let (instance, stance) = find(structure, next, at, name)?;
-        stances.insert(name, (instance, Stance { base: *base, ..stance }));
+        stances.insert(name, (at, instance, Stance { base: *base, ..stance }));
     }
     for (at, (name, values)) in entries(List::Joints, joints) {
         let (instance, stance) = match stances.remove(name) {
-            Some(known) => known,
+            Some((_, instance, stance)) => (instance, stance),
             None => find(structure, next, at, name)?,
         };
         let configuration = with_values(instance.robot.kinematics(), stance.configuration, values)
             .map_err(|error| SceneError::Joints { at, error })?;
-        stances.insert(name, (instance, Stance { configuration, ..stance }));
+        stances.insert(name, (at, instance, Stance { configuration, ..stance }));
     }
     let mut moved = Vec::new();
-    for (name, (instance, stance)) in stances {
+    for (name, (at, instance, stance)) in stances {
         let stance = Stance { stamp: next.revision(), ..stance };
-        let poses = link_poses(instance, name, &stance)?;
+        let poses = link_poses(at, instance, name, &stance)?;
         moved.extend(poses.into_iter().filter(|(slot, pose)| next.pose_at(*slot) != pose));
         next.set_stance(name, Some(stance));
     }
@@ -137,7 +137,7 @@ pub(crate) fn move_robots(
 }
 
 /// World poses of the objects of a robot's links.
-fn link_poses(instance: &Instance, name: &str, stance: &Stance) -> Result<Vec<(Slot, Pose)>, SceneError> {
+fn link_poses(at: Entry, instance: &Instance, name: &str, stance: &Stance) -> Result<Vec<(Slot, Pose)>, SceneError> {
     let (kinematics, mut links) = (instance.robot.kinematics(), Vec::<Isometry3<f64>>::new());
     kinematics.forward(&isometry(&stance.base), &stance.configuration, &mut links);
     let mut poses = Vec::with_capacity(links.len());
@@ -145,7 +145,7 @@ fn link_poses(instance: &Instance, name: &str, stance: &Stance) -> Result<Vec<(S
         let Some(slot) = slot else { continue };
         let pose = pose_of(&links[link]).map_err(|error| {
             let name = format!("{name}/{}", kinematics.links()[link]).into();
-            SceneError::Pose { name, error }
+            SceneError::LinkPose { at, name, error }
         })?;
         poses.push((*slot, pose));
     }

@@ -1,6 +1,6 @@
 //! Random scenes of everything a scene can contain.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::Vector3;
 use sublevel_core::body::{Body, BodyId, Compound, Shape};
@@ -10,6 +10,11 @@ use sublevel_testkit::Seeded;
 
 /// Bodies of every convex kind, some tenths of a metre in size.
 pub(crate) fn bodies() -> Vec<Geometry> {
+    static BODIES: OnceLock<Vec<Geometry>> = OnceLock::new();
+    BODIES.get_or_init(new_bodies).clone()
+}
+
+fn new_bodies() -> Vec<Geometry> {
     let ball = Body::ball("ball", Vector3::zeros(), 0.2).expect("a ball");
     let egg = Body::ellipsoid("egg", Vector3::new(0.1, 0.0, 0.0), Vector3::new(0.3, 0.2, 0.1)).expect("an egg");
     let cuboid = Body::cuboid("box", Vector3::new(0.1, 0.2, 0.15)).expect("a box").with_gap(0.0);

@@ -9,7 +9,7 @@ mod states;
 mod updates;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, OnceLock};
 
 use sublevel_core::body::Body;
 use sublevel_core::measure::Pose;
@@ -52,9 +52,11 @@ pub(crate) const ARM: &str = r#"<robot name="arm">
     <axis xyz="-1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/><mimic joint="slide" multiplier="2"/></joint>
 </robot>"#;
 
-/// The arm with pairs of links that an SRDF disables.
+/// The arm with pairs of links that an SRDF disables; each made once, as its bodies take long.
 pub(crate) fn robot(disabled: &[(&str, &str)]) -> Arc<Robot> {
-    robot_with(disabled, &BTreeMap::new())
+    static MADE: Mutex<BTreeMap<String, Arc<Robot>>> = Mutex::new(BTreeMap::new());
+    let mut made = MADE.lock().expect("nothing fails in here");
+    made.entry(format!("{disabled:?}")).or_insert_with(|| robot_with(disabled, &BTreeMap::new())).clone()
 }
 
 pub(crate) fn robot_with(disabled: &[(&str, &str)], bodies: &BTreeMap<Arc<str>, Geometry>) -> Arc<Robot> {
@@ -84,9 +86,13 @@ pub(crate) fn set(robot: &str, named: NamedJointValues) -> Update {
 
 /// A ball and a box to put around.
 pub(crate) fn things() -> [Geometry; 2] {
-    let ball = Body::ball("ball", nalgebra::Vector3::zeros(), 0.1).expect("a ball").with_gap(0.0);
-    let cuboid = Body::cuboid("box", nalgebra::Vector3::new(0.1, 0.2, 0.05)).expect("a box").with_gap(0.0);
-    [ball.into(), cuboid.into()]
+    static THINGS: OnceLock<[Geometry; 2]> = OnceLock::new();
+    let make = || {
+        let ball = Body::ball("ball", nalgebra::Vector3::zeros(), 0.1).expect("a ball").with_gap(0.0);
+        let cuboid = Body::cuboid("box", nalgebra::Vector3::new(0.1, 0.2, 0.05)).expect("a box").with_gap(0.0);
+        [ball.into(), cuboid.into()]
+    };
+    THINGS.get_or_init(make).clone()
 }
 
 pub(crate) fn apply(scene: &Scene, update: &Update) -> Result<Scene, SceneError> {
