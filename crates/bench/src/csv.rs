@@ -83,7 +83,7 @@ impl<'a> Row<'a> {
 }
 
 /// Decimal digits of what is measured and drawn.
-pub(crate) const MEASURED: usize = 6;
+pub(crate) const MEASURED: usize = 4;
 
 /// `value` rounded to that many decimal digits, so that a file holds no more than was measured.
 pub(crate) fn significant(value: f64, digits: usize) -> f64 {

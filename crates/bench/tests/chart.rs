@@ -241,9 +241,9 @@ fn the_quick_chart_of_the_panda_keeps_what_is_free() {
     let given = column(states, "", "given_us");
     assert!(given.len() > 9 && given.iter().skip(1).all(|us| *us > 0.0), "{states}");
     assert!(report.contains("| poses given µs | of coal |"), "the table of states shows them");
-    let gaps = column(links, "\"within 2 cm, as by default\",", "gap_m");
+    let gaps = column(links, "\"within 2 cm\",", "gap_m");
     assert!(gaps.len() == 11 && gaps.iter().all(|gap| (0.0..=0.02).contains(gap)), "{links}");
-    for name in ["degree 4", "degree 6", "two parts of degree 6 refined", "within 2 cm, as by default"] {
+    for name in ["degree 4", "degree 6", "two parts of degree 6 refined", "degree 6 refined, as by default"] {
         let [free, samples, contacts] = ["free", "samples", "contacts"].map(|head| of(motions, name, head));
         assert_eq!((free.len(), samples.len()), (3, 3), "{name}");
         assert!(free.iter().zip(&samples).all(|(free, samples)| *free > 0.0 && *samples == 100.0 * free), "{name}");
@@ -260,7 +260,7 @@ fn the_quick_chart_of_the_panda_keeps_what_is_free() {
     }
     // Looked at for one representation, whatever the number of problems.
     assert_eq!(srdf.lines().count(), 1 + 1, "{srdf}");
-    let found = ["pairs", "never", "proven"].map(|head| count(srdf, "within 2 cm, as by default", head));
+    let found = ["pairs", "never", "proven"].map(|head| count(srdf, "degree 6 refined, as by default", head));
     assert!(found == [55.0, 23.0, 22.0] && srdf.contains(",panda_link2 and panda_link6,"), "{srdf}");
     assert!(report.contains("Coal took no part"), "no word of coal");
 }
@@ -300,15 +300,11 @@ fn the_panda_takes_other_problems_and_prints_json() {
     let is_of_coal = |figure: &&serde_json::Value| figure["what"].as_str().is_some_and(|what| what.contains("of coal"));
     assert!(summary.iter().filter(is_of_coal).all(|figure| figure["value"].is_null()), "{summary:?}");
     assert!(summary.iter().filter(|figure| figure["value"].is_number()).count() > 10, "{summary:?}");
-    // The default is measured as degree 6 is.
     for what in
         ["the same with self-collision, of the one before", "CheckStates over gRPC in batches of 1 000, of in process"]
     {
-        for suffix in ["", ", links within 2 cm, as by default"] {
-            let name = format!("{what}{suffix}");
-            let found: Vec<_> = summary.iter().filter(|figure| figure["what"] == name.as_str()).collect();
-            assert!(found.len() == 1 && found[0]["value"].is_number(), "{name}: {summary:?}");
-        }
+        let found: Vec<_> = summary.iter().filter(|figure| figure["what"] == what).collect();
+        assert!(found.len() == 1 && found[0]["value"].is_number(), "{what}: {summary:?}");
     }
     assert!(found["links"].as_array().expect("rows").len() > 80 && found["machine"]["cores"].is_number());
     let meshes = found["meshes"].as_array().expect("rows");
@@ -320,7 +316,7 @@ fn the_panda_takes_other_problems_and_prints_json() {
     }
     let srdf = found["srdf"].as_array().expect("rows");
     assert_eq!(srdf.len(), 1, "{srdf:?}");
-    assert_eq!(srdf[0]["representation"], "within 2 cm, as by default");
+    assert_eq!(srdf[0]["representation"], "degree 6 refined, as by default");
     for (count, expected) in [("pairs", 55), ("never", 23), ("proven", 22)] {
         assert_eq!(srdf[0][count], expected, "{count}: {srdf:?}");
     }

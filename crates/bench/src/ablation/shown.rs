@@ -29,7 +29,7 @@ const TITLES: [(&str, &str); 32] = [
     ("Lanes", "batches: lanes"),
     ("DirectionSampling", "depth: sampling of directions"),
     ("CompassSearch", "depth: search around a direction"),
-    ("SupportLanes", "supports: Newton, one constraint"),
+    ("SupportLanes", "supports: Newton"),
     ("AlongAxis", "capsules: single points of the axis"),
     ("ProjectionSteps", "one body: quadratic programs"),
     ("ProjectionInterior", "one body: interior points"),

@@ -83,15 +83,14 @@ impl FitCache {
         self.keep(what, mesh, options, || make().map_err(failed))
     }
 
-    /// The body that `sublevel robot` fits to the mesh of a link, in its frame, which reaches at
-    /// most so far beyond it, metres.
+    /// The body that `sublevel robot` fits to the mesh of a link, in its frame.
     ///
     /// # Errors
     /// [`FitCacheError`].
-    pub fn link(&self, link: &Link, mesh: &Mesh, max_gap_m: f64) -> Result<Shape, FitCacheError> {
-        let what = format!("{}-gap-{max_gap_m}", link.name.replace('_', "-"));
-        self.keep(&what, mesh, &format!("within {max_gap_m} m"), || {
-            let made = fit_link(link, mesh.clone(), LinkFit::WithinGap(max_gap_m), || ControlFlow::Continue(()));
+    pub fn link(&self, link: &Link, mesh: &Mesh, how: LinkFit) -> Result<Shape, FitCacheError> {
+        let what = format!("{}-link", link.name.replace('_', "-"));
+        self.keep(&what, mesh, &format!("{how:?}"), || {
+            let made = fit_link(link, mesh.clone(), how, || ControlFlow::Continue(()));
             made.map_err(|source| FitCacheError::Link { name: link.name.to_string(), source })
         })
     }

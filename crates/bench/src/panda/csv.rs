@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::rows::{LinkRow, MeshRow, MotionRow, SrdfRow, StateRow, Tables};
-use crate::csv::{CsvError, Row, Table};
+use crate::csv::{CsvError, MEASURED, Row, Table, significant};
 
 /// Columns of the table of states.
 const STATES: &str = "family,representation,pieces,known,kept,kept_self,random,random_free,contacts,cold_us,scene_us,\
@@ -176,7 +176,7 @@ fn motion(row: Row<'_>) -> Result<MotionRow, CsvError> {
 
 /// Four digits; nothing of what is not measured.
 fn number(value: f64) -> String {
-    if value.is_nan() { String::new() } else { format!("{value:.4}") }
+    if value.is_nan() { String::new() } else { significant(value, MEASURED).to_string() }
 }
 
 fn maybe(count: Option<usize>) -> String {
@@ -244,7 +244,7 @@ mod tests {
             missed: 1,
         };
         let srdf = SrdfRow {
-            representation: "within 2 cm, as by default".into(),
+            representation: "degree 6 refined, as by default".into(),
             pairs: 55,
             never: 23,
             proven: 22,
@@ -260,12 +260,12 @@ mod tests {
         let text = written(&all);
         assert_eq!(read(&text), Ok(all.clone()));
         // Earlier runs did not measure states at given poses.
-        let without = text.replace("scene_us,given_us,", "scene_us,").replace(",1.2500,0.7500,", ",1.2500,");
+        let without = text.replace("scene_us,given_us,", "scene_us,").replace(",1.25,0.75,", ",1.25,");
         let mut earlier = read(&without).expect("a CSV without the column");
         assert!(earlier.states[0].given_us.is_nan());
         earlier.states[0].given_us = 0.75;
         assert_eq!(earlier, all);
-        assert!(read(&text.replace(",0.7500,", ",fast,")).is_err());
+        assert!(read(&text.replace(",0.75,", ",fast,")).is_err());
         // Earlier runs wrote fewer tables.
         let tables: Vec<&str> = text.split("\n\n").collect();
         let before = |count: usize| read(&tables[..count].join("\n\n"));

@@ -123,7 +123,7 @@ pub(super) fn measure(
         let given = tasks.iter().zip(&scenes).map(of_task).collect::<Result<Vec<_>, _>>()?;
         entries.push(Entry { links: *links, arm: loaded, scenes, given, times: Default::default() });
     }
-    let reference = entries.iter().position(|entry| entry.links == Representation::Degree6).unwrap_or(0);
+    let reference = entries.iter().position(|entry| entry.links == Representation::Default).unwrap_or(0);
     for (index, task) in tasks.iter_mut().enumerate() {
         let marks = free(&entries[reference].scenes[index][0], &task.states.timed)?;
         task.states.free = marked(&task.states.timed, width, &marks);

@@ -109,7 +109,7 @@ pub fn panda(
         for own in &sites {
             announce(&format!("motions: {}, {}", links.name(), own[0].problem.family))?;
             // Coal takes the edges of the representations that the summary is about.
-            let beside = if summary::SUBJECTS.contains(links) { beside } else { (None, folder.path()) };
+            let beside = if *links == summary::MAIN { beside } else { (None, folder.path()) };
             measured.push(motions::measure(&arm, (*links, loaded), own, beside, (extent.samples, &crew))?);
         }
     }

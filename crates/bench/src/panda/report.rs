@@ -38,7 +38,7 @@ impl Panda {
              question; with *poses given* the poses of the links that move are computed before the clock starts. Coal gets \
              the poses of its hulls, looks at pairs whose bounding spheres meet, and knows no self-collision; `cold` is \
              without hints or cached guesses. *Distances* are those of all pairs of a moving link and an obstacle, accurate to 1e-6, \
-             in the states that degree 6 proves free. *Missed* are states anywhere that are \
+             in the states that the default proves free. *Missed* are states anywhere that are \
              proven free while the convex hull of a link touches: the spheres leave parts of the links out, and two parts need \
              not fill the hull of a link. The last two columns are states with self-collision in batches of 1 000 on all \
              cores, of the first problem of each family.\n\n{states}\n\
@@ -60,8 +60,7 @@ impl Panda {
              Straight edges in joint space towards configurations anywhere, with self-collision; of each problem the first \
              candidate that a representation proves free. A proof holds for the whole edge. Beside it the states that a \
              checker would sample on the same edge at 1/32 rad: ours with self-collision and kinematics, coal's on the edges \
-             of degree 6 and on those of links within 2 cm, as by default, with neither. Ladders prove motions by their finest \
-             bodies, those of degree 6.\n\n{motions}\n\
+             of the default, with neither. Ladders prove motions by their finest bodies, those of degree 6.\n\n{motions}\n\
              ![time of a radian against states kept](panda-motions.svg)\n\n\
              ### Proofs\n\n\
              Percentiles are over the edges of all families. A state check is one with self-collision of the same \

@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use sublevel::body::{Body, Shape};
 use sublevel::fit::{FitOptions, fit_parts};
+use sublevel::jobs::LinkFit;
 use sublevel::robot::{Description, read_srdf, read_urdf};
 use sublevel::scene::{Geometry, Ladder, Robot, RobotId};
 use sublevel::store::RobotSource;
@@ -15,8 +16,7 @@ use super::arm::{Arm, ArmLink};
 use super::rows::LinkRow;
 use crate::comparison::FitCache;
 
-/// How far a body of [`Representation::Default`] may reach beyond its link, metres: the default of
-/// `sublevel robot`.
+/// How far a body of [`Representation::WithinGap`] may reach beyond its link, metres.
 const MAX_GAP_M: f64 = 0.02;
 
 /// How links are represented.
@@ -30,16 +30,17 @@ pub(crate) enum Representation {
     Degree4,
     /// Bodies of degree 6.
     Degree6,
-    /// Bodies of degree 6 with refined volumes.
-    Refined,
+    /// What `sublevel robot` fits where nothing else is asked for: bodies of degree 6 with refined
+    /// volumes.
+    Default,
     /// Degrees 2, 4 and 6, coarsest first.
     Ladder,
     /// Two bodies of degree 6 per link, with refined volumes.
     Compound,
     /// One or two of those per link, whichever has the smaller gap.
     AtMostTwo,
-    /// What `sublevel robot` fits where nothing else is asked for.
-    Default,
+    /// The cheapest bodies within a gap.
+    WithinGap,
 }
 
 impl Representation {
@@ -49,11 +50,11 @@ impl Representation {
         Self::Ellipsoids,
         Self::Degree4,
         Self::Degree6,
-        Self::Refined,
+        Self::Default,
         Self::Ladder,
         Self::Compound,
         Self::AtMostTwo,
-        Self::Default,
+        Self::WithinGap,
     ];
 
     /// Its name in tables.
@@ -63,11 +64,11 @@ impl Representation {
             Self::Ellipsoids => "ellipsoids",
             Self::Degree4 => "degree 4",
             Self::Degree6 => "degree 6",
-            Self::Refined => "degree 6 refined",
+            Self::Default => "degree 6 refined, as by default",
             Self::Ladder => "ladder 2-4-6",
             Self::Compound => "two parts of degree 6 refined",
             Self::AtMostTwo => "one or two parts, the smaller gap",
-            Self::Default => "within 2 cm, as by default",
+            Self::WithinGap => "within 2 cm",
         }
     }
 
@@ -126,22 +127,23 @@ impl Arm {
             let options = FitOptions { degree, refine, ..FitOptions::default() };
             cache.body(&name, &link.mesh, &options)
         };
+        let fit = |how: LinkFit| {
+            let described = self.description.links.iter().find(|described| described.name == link.name);
+            let described = described.ok_or("a link that is not in the description")?;
+            Ok::<_, Box<dyn Error>>(Geometry::Solid(Arc::new(cache.link(described, &link.mesh, how)?)))
+        };
         Ok(match links {
             Representation::Ellipsoids => of_degree(2, false)?.into(),
             Representation::Degree4 => of_degree(4, false)?.into(),
             Representation::Degree6 => of_degree(6, false)?.into(),
-            Representation::Refined => of_degree(6, true)?.into(),
             Representation::Ladder => {
                 let rung =
                     |degree: usize| Ok::<_, Box<dyn Error>>(Arc::new(Shape::Body(Box::new(of_degree(degree, false)?))));
                 let rungs = [2, 4, 6].into_iter().map(rung).collect::<Result<Vec<_>, _>>()?;
                 Geometry::Ladder(Arc::new(Ladder::new(&name, rungs)?))
             }
-            Representation::Default => {
-                let described = self.description.links.iter().find(|described| described.name == link.name);
-                let described = described.ok_or("a link that is not in the description")?;
-                Geometry::Solid(Arc::new(cache.link(described, &link.mesh, MAX_GAP_M)?))
-            }
+            Representation::Default => fit(LinkFit::default())?,
+            Representation::WithinGap => fit(LinkFit::WithinGap(MAX_GAP_M))?,
             Representation::Spheres | Representation::Compound => {
                 Geometry::Solid(Arc::new(two_parts(link, &name, cache)?))
             }

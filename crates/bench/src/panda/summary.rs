@@ -27,12 +27,8 @@ pub(super) enum Unit {
     Ratio,
 }
 
-/// The representation that the figures are about first.
-const MAIN: Representation = Representation::Degree6;
-
-/// The representations whose states and edges the figures are about: the main one, and what
-/// `sublevel robot` fits.
-pub(super) const SUBJECTS: [Representation; 2] = [MAIN, Representation::Default];
+/// The representation whose states and edges the figures are about.
+pub(super) const MAIN: Representation = Representation::Default;
 
 impl Unit {
     /// A value as text.
@@ -51,14 +47,9 @@ pub(super) fn summary(tables: &Tables) -> Vec<Figure> {
     let Tables { states, motions, meshes, srdf, .. } = tables;
     let (main, mut all) = (MAIN.name(), Vec::new());
     let mut add = |what: String, value: f64, unit: Unit| all.push(Figure { what, value, unit });
-    for links in [MAIN, Representation::Refined, Representation::Compound, Representation::AtMostTwo] {
+    for links in [MAIN, Representation::Degree6, Representation::Compound, Representation::AtMostTwo] {
         let value = of_all(states, links.name()).map_or(f64::NAN, StateRow::kept_share);
         add(format!("known-free states kept, {}", links.name()), value, Unit::Share);
-    }
-    // Earlier runs did not have it.
-    let default = of_all(states, Representation::Default.name());
-    if let Some(row) = default {
-        add(format!("known-free states kept, {}", subject(Representation::Default)), row.kept_share(), Unit::Share);
     }
     let contacts = of_all(states, main).and_then(|row| row.contacts).map_or(f64::NAN, |contacts| contacts as f64);
     add(format!("states anywhere that {main} calls free and coal's hulls in contact"), contacts, Unit::Count);
@@ -71,22 +62,16 @@ pub(super) fn summary(tables: &Tables) -> Vec<Figure> {
         add(what, row.proven as f64, Unit::Count);
         add("time of all pairs, s".into(), row.seconds, Unit::Ratio);
     }
-    for links in SUBJECTS.into_iter().filter(|links| *links == MAIN || default.is_some()) {
-        add_states(tables, links, &mut add);
-        add_edges(tables, links, &mut add);
-    }
+    add_states(tables, &mut add);
+    add_edges(tables, &mut add);
     let all_rows = || motions.iter().filter(|row| row.family == ALL);
     let samples: usize = all_rows().map(|row| row.samples).sum();
     let contacts: usize = all_rows().map(|row| row.contacts).sum();
     add(format!("contacts among {samples} samples of edges that are proven free"), contacts as f64, Unit::Count);
-    for links in SUBJECTS {
-        let rows = || all_rows().filter(|row| row.representation == links.name());
-        let of_coal =
-            |value: fn(&MotionRow) -> Option<usize>| rows().filter_map(value).reduce(|sum, count| sum + count);
-        if let (Some(samples), Some(contacts)) = (of_coal(|row| row.coal_samples), of_coal(|row| row.coal_contacts)) {
-            let what = format!("contacts of coal's hulls among {samples} of them, {}", subject(links));
-            add(what, contacts as f64, Unit::Count);
-        }
+    let rows = || all_rows().filter(|row| row.representation == main);
+    let of_coal = |value: fn(&MotionRow) -> Option<usize>| rows().filter_map(value).reduce(|sum, count| sum + count);
+    if let (Some(samples), Some(contacts)) = (of_coal(|row| row.coal_samples), of_coal(|row| row.coal_contacts)) {
+        add(format!("contacts of coal's hulls among {samples} of them"), contacts as f64, Unit::Count);
     }
     all
 }
@@ -96,68 +81,49 @@ fn of_all<'a>(states: &'a [StateRow], name: &str) -> Option<&'a StateRow> {
     states.iter().find(|row| row.family == ALL && row.representation == name)
 }
 
-/// A representation as figures name it.
-fn subject(links: Representation) -> String {
-    if links == Representation::Default { format!("links {}", links.name()) } else { links.name().into() }
-}
-
-/// What figures that do not name the main representation add for another one.
-fn suffix(links: Representation) -> String {
-    if links == MAIN { String::new() } else { format!(", {}", subject(links)) }
-}
-
-/// Figures of states of a representation.
-fn add_states(tables: &Tables, links: Representation, add: &mut impl FnMut(String, f64, Unit)) {
-    let (row, coal) = (of_all(&tables.states, links.name()), of_all(&tables.states, COAL));
+/// Figures of states.
+fn add_states(tables: &Tables, add: &mut impl FnMut(String, f64, Unit)) {
+    let (row, coal) = (of_all(&tables.states, MAIN.name()), of_all(&tables.states, COAL));
     let own = |value: fn(&StateRow) -> f64| row.map_or(f64::NAN, value);
     let of_coal = |value: fn(&StateRow) -> f64| own(value) / coal.map_or(f64::NAN, value);
-    let (subject, suffix) = (subject(links), suffix(links));
-    // Earlier runs did not have it.
-    if own(|row| row.given_us).is_finite() {
-        add(
-            format!("state among obstacles, {subject}, poses of the links given, of coal with cached guesses"),
-            of_coal(|row| row.given_us),
-            Unit::Ratio,
-        );
-    }
     add(
-        format!("state among obstacles, {subject}, kinematics included, of coal with cached guesses"),
+        "state among obstacles, poses of the links given, of coal with cached guesses".into(),
+        of_coal(|row| row.given_us),
+        Unit::Ratio,
+    );
+    add(
+        "state among obstacles, kinematics included, of coal with cached guesses".into(),
         of_coal(|row| row.scene_us),
         Unit::Ratio,
     );
+    add("the same with self-collision, of the one before".into(), own(|row| row.self_us / row.scene_us), Unit::Ratio);
+    add("distances of all pairs of a state, of coal".into(), of_coal(|row| row.distances_us), Unit::Ratio);
     add(
-        format!("the same with self-collision, of the one before{suffix}"),
-        own(|row| row.self_us / row.scene_us),
-        Unit::Ratio,
-    );
-    add(format!("distances of all pairs of a state, {subject}, of coal"), of_coal(|row| row.distances_us), Unit::Ratio);
-    add(
-        format!("CheckStates over gRPC in batches of 1 000, of in process{suffix}"),
+        "CheckStates over gRPC in batches of 1 000, of in process".into(),
         own(|row| row.call_us / row.inside_us),
         Unit::Ratio,
     );
 }
 
-/// Figures of edges of a representation.
-fn add_edges(tables: &Tables, links: Representation, add: &mut impl FnMut(String, f64, Unit)) {
-    let state_us = of_all(&tables.states, links.name()).map_or(f64::NAN, |row| row.self_us);
+/// Figures of edges.
+fn add_edges(tables: &Tables, add: &mut impl FnMut(String, f64, Unit)) {
+    let state_us = of_all(&tables.states, MAIN.name()).map_or(f64::NAN, |row| row.self_us);
     let of_kind = |kind: usize| {
         let is_kind = |row: &&MotionRow| {
             let at = KINDS[kind];
-            let is_own = row.family == ALL && row.representation == links.name();
+            let is_own = row.family == ALL && row.representation == MAIN.name();
             is_own && row.from == at.from() && row.length_rad == at.length_rad
         };
         tables.motions.iter().find(is_kind)
     };
     let of_edge = |kind: usize, value: fn(&MotionRow) -> f64| of_kind(kind).map_or(f64::NAN, value);
-    let suffix = suffix(links);
     let kinds = ["free edge of 0.5 rad from a goal", "free edge of 1 rad", "free edge of 5 rad"];
     for (kind, what) in kinds.into_iter().enumerate() {
         let units = [("in state checks", state_us), ("in checks of its samples", of_edge(kind, MotionRow::sample_us))];
         for (words, unit_us) in units {
             let [median, p99] = [of_edge(kind, |row| row.median_us), of_edge(kind, |row| row.p99_us)];
-            add(format!("{what}, median, {words}{suffix}"), median / unit_us, Unit::Ratio);
-            add(format!("{what}, 99th percentile, {words}{suffix}"), p99 / unit_us, Unit::Ratio);
+            add(format!("{what}, median, {words}"), median / unit_us, Unit::Ratio);
+            add(format!("{what}, 99th percentile, {words}"), p99 / unit_us, Unit::Ratio);
         }
     }
     type OfRow = fn(&MotionRow) -> f64;
@@ -170,7 +136,7 @@ fn add_edges(tables: &Tables, links: Representation, add: &mut impl FnMut(String
         ("proof, of coal's checks of as many samples, at 1 rad", |row| row.mean_us / row.coal_us),
     ];
     for (what, value) in at_a_radian {
-        add(format!("{what}{suffix}"), of_edge(1, value), Unit::Ratio);
+        add(what.to_owned(), of_edge(1, value), Unit::Ratio);
     }
 }
 
@@ -183,12 +149,11 @@ mod tests {
         let figures = summary(&Tables::default());
         let unmeasured = figures.iter().filter(|figure| figure.unit.text(figure.value) == "not measured");
         assert!(unmeasured.count() > 10);
-        assert!(!figures.iter().any(|figure| figure.what.contains("given") || figure.what.contains("by default")));
         assert_eq!([Unit::Share.text(0.998), Unit::Count.text(3.0)], ["99.80 %", "3"]);
     }
 
     #[test]
-    fn the_default_is_beside_the_main_representation() {
+    fn figures_are_those_of_the_default() {
         let state = |representation: &str, us: f64| StateRow {
             family: ALL.into(),
             representation: representation.into(),
@@ -207,10 +172,9 @@ mod tests {
             call_us: 5.0,
             inside_us: 4.0,
         };
-        let default = Representation::Default.name();
         let edge = MotionRow {
             family: ALL.into(),
-            representation: default.into(),
+            representation: MAIN.name().into(),
             from: KINDS[1].from().into(),
             length_rad: KINDS[1].length_rad,
             problems: 2,
@@ -229,8 +193,12 @@ mod tests {
             coal_samples: Some(66),
             coal_contacts: Some(1),
         };
-        let mut tables = Tables {
-            states: vec![state(MAIN.name(), 2.0), state(default, 4.0), StateRow { given_us: 8.0, ..state(COAL, 8.0) }],
+        let tables = Tables {
+            states: vec![
+                state(MAIN.name(), 4.0),
+                state("degree 6", 2.0),
+                StateRow { given_us: 8.0, ..state(COAL, 8.0) },
+            ],
             motions: vec![edge],
             ..Tables::default()
         };
@@ -240,14 +208,11 @@ mod tests {
             found[0]
         };
         let figures = summary(&tables);
-        for (links, of_coal) in [("degree 6", 0.25), ("links within 2 cm, as by default", 0.5)] {
-            let state = |how: &str| format!("state among obstacles, {links}, {how}, of coal with cached guesses");
-            assert_eq!(value(&figures, &state("poses of the links given")), 0.5 * of_coal);
-            assert_eq!(value(&figures, &state("kinematics included")), of_coal);
-            assert_eq!(value(&figures, &format!("distances of all pairs of a state, {links}, of coal")), of_coal);
-        }
         for (what, expected) in [
-            ("known-free states kept", 0.75),
+            ("known-free states kept, degree 6 refined, as by default", 0.75),
+            ("state among obstacles, poses of the links given, of coal with cached guesses", 0.25),
+            ("state among obstacles, kinematics included, of coal with cached guesses", 0.5),
+            ("distances of all pairs of a state, of coal", 0.5),
             ("the same with self-collision, of the one before", 3.0),
             ("CheckStates over gRPC in batches of 1 000, of in process", 1.25),
             ("free edge of 1 rad, median, in state checks", 4.0),
@@ -258,20 +223,7 @@ mod tests {
             ("proof, of coal's checks of as many samples, at 1 rad", 0.25),
             ("contacts of coal's hulls among 66 of them", 1.0),
         ] {
-            assert_eq!(value(&figures, &format!("{what}, links {default}")), expected, "{what}");
+            assert_eq!(value(&figures, what), expected, "{what}");
         }
-        // Of degree 6 no edges are there.
-        assert!(value(&figures, "free edge of 1 rad, median, in state checks").is_nan());
-
-        // As in a file of an earlier run.
-        tables.states.remove(1);
-        tables.states.iter_mut().for_each(|row| row.given_us = f64::NAN);
-        tables.motions.clear();
-        let figures = summary(&tables);
-        assert!(!figures.iter().any(|figure| figure.what.contains("given") || figure.what.contains("by default")));
-        assert_eq!(
-            value(&figures, "state among obstacles, degree 6, kinematics included, of coal with cached guesses"),
-            0.25
-        );
     }
 }

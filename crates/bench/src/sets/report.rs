@@ -7,11 +7,10 @@ use super::counterexample::Level;
 use super::models::Model;
 use super::pairs::Bracket;
 use crate::blocks::block;
-use crate::csv::{rounded_down, rounded_up, significant};
+use crate::csv::{MEASURED, rounded_down, rounded_up, significant};
 
-/// Decimal digits of times and errors, and of bounds, whose differences are drawn down to 1e-12.
-const MEASURED: usize = 4;
-const BOUNDS: usize = 13;
+/// Decimal digits of bounds, whose differences are drawn down to 1e-9.
+const BOUNDS: usize = 11;
 
 impl Sets {
     /// The report, but for what `Shown` writes into its blocks.

@@ -88,7 +88,7 @@ mod tests {
             let shift = random.direction() * 3.0;
             // Of a capsule of radius 0.3 whose axis is 1.4 long: the cylinder around it is known.
             let mut points: Vec<Vector3<f64>> = Vec::new();
-            for _ in 0..1500 {
+            for _ in 0..500 {
                 let n = random.direction();
                 points.push(turn * (n * 0.3 + Vector3::z() * 0.7_f64.copysign(n.z)) + shift);
             }
