@@ -67,7 +67,8 @@ pub(super) struct LoadArgs {
     /// Core that the echo server runs on; 'taskset' gives the server and this command theirs
     #[arg(long, value_name = "CORE")]
     echo_core: Option<usize>,
-    /// Process id of the server, on this machine: reports how busy it keeps the cores, and its memory
+    /// Process id of the server, on this machine: reports how busy it keeps the cores, and its
+    /// memory
     #[arg(long, value_name = "PID")]
     server_pid: Option<u32>,
     /// File for all numbers

@@ -89,7 +89,8 @@ pub(super) async fn run(app: AppState, mut messages: Streaming<StreamPosesReques
                 ended = true;
                 stopped_before_end = true;
             }
-            // In no order: what has come already may be merged first, and all others have their turn.
+            // In no order: what has come already may be merged first, and all others have their
+            // turn.
             () = std::future::ready(()), if applying.is_none() && pending.messages > 0 => {
                 let (Some(table), poses) = (&table, std::mem::take(&mut pending)) else { continue };
                 match apply_at_once(&app, table, &poses).await {

@@ -147,7 +147,8 @@ pub fn moved(body: &Body, turn: &UnitQuaternion<f64>, shift: &Vector3<f64>) -> B
 }
 
 /// The body of these half sizes, metres, with the constraints of one of unit sizes about its
-/// origin, turned and moved within its frame: what [`Body::moved`] makes of one that is not made here.
+/// origin, turned and moved within its frame: what [`Body::moved`] makes of one that is not made
+/// here.
 pub fn placed(unit: &Body, sizes: [f64; 3], turn: &UnitQuaternion<f64>, shift: &Vector3<f64>) -> Body {
     let numbers: Vec<f64> = sizes.iter().chain(turn.coords.iter()).chain(shift).copied().collect();
     kept(&format!("{} placed", unit.name()), &numbers, || {

@@ -46,8 +46,8 @@ impl Kinematics {
         }
     }
 
-    /// Bounds of the errors of [`Kinematics::forward`] for the poses that it has given, in the order
-    /// of [`Kinematics::links`].
+    /// Bounds of the errors of [`Kinematics::forward`] for the poses that it has given, in the
+    /// order of [`Kinematics::links`].
     ///
     /// A joint that turns by δ too much moves a point by δ times the way to it, which is at most as
     /// long as the links between them and the way from the origin of the last one: the sum over

@@ -12,9 +12,10 @@
 //! before, and the constraints straightened by the mean m of their value and 1. While B's active
 //! set stays, its minimiser follows x by `β = β_0 + S α`, S from the compliance `G = Z (Zᵀ Q Z)⁻¹
 //! Zᵀ` of Q, what is quadratic in dy, on the directions Z that the set leaves free. What is left is
-//! the distance from B's offset surface through x, whose curvature is `K = (I - S) / D`: a quadratic
-//! program in dx alone, which finds A's active set (`quadratic_program`). Where B's multipliers or
-//! constraints say so, its own program then finds another set for it, and A's is solved again.
+//! the distance from B's offset surface through x, whose curvature is `K = (I - S) / D`: a
+//! quadratic program in dx alone, which finds A's active set (`quadratic_program`). Where B's
+//! multipliers or constraints say so, its own program then finds another set for it, and A's is
+//! solved again.
 //!
 //! The proof needs no other bracket than that of two smooth bodies: `Σ w_i g_i <= 1` with the
 //! weights `λ_i / Σ λ` of the active constraints is one convex constraint that holds all over A and
