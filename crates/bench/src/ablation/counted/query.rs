@@ -83,7 +83,8 @@ impl Answer {
     fn of_cast(cast: &RayCast) -> Self {
         match *cast {
             RayCast::Hit(hit) => Self::new(hit.status, [hit.lower, hit.upper], hit.iterations),
-            RayCast::Undecided { lower, upper } => Self::new(Status::BracketWide, [lower, upper], 0),
+            // It may miss as well.
+            RayCast::Undecided { lower, .. } => Self::new(Status::BracketWide, [lower, f64::INFINITY], 0),
             RayCast::Miss => Self::new(Status::Converged, [f64::INFINITY; 2], 0),
         }
     }
