@@ -9,7 +9,7 @@ use crate::machine::locked;
 use std::fmt::Write;
 
 /// Decimal digits of errors and widths, which are drawn over many powers of ten.
-const DIGITS: usize = 4;
+const DIGITS: usize = 3;
 
 impl Accuracy {
     /// The report, but for what `Shown` writes into its blocks.
