@@ -11,7 +11,7 @@ use sublevel_robot::motion::{
     MotionProblemError, MotionRobot, MotionShape, MotionVerdict, MotionWorkspace, Path, PathError, PlacedObstacle,
     VerifiedMotion, VerifyOptions,
 };
-use sublevel_robot::{ConfigurationError, Kinematics};
+use sublevel_robot::{ConfigurationError, Kinematics, counted};
 
 use super::thing::{Thing, WorldHalfSpace};
 use crate::crew::{Question, Stop};
@@ -65,7 +65,10 @@ pub enum RobotMotionsError {
     #[error(transparent)]
     Joints(#[from] JointsError),
     /// Values that are not those of the paths.
-    #[error("holds {given} numbers; {points} configurations of {width} values take {}", points * width)]
+    #[error(
+        "holds {}; {} of {} take {}", counted(*given, "number", "numbers"),
+        counted(*points, "configuration", "configurations"), counted(*width, "value", "values"), points * width
+    )]
     Values {
         /// How many there are.
         given: usize,

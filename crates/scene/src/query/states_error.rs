@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use sublevel_robot::counted;
+
 use crate::robot::JointsError;
 
 /// Why states cannot be placed.
@@ -53,7 +55,7 @@ pub enum StatesError {
     #[error("holds {0} states; send one")]
     Several(usize),
     /// Joint values that are not one state.
-    #[error("holds {numbers} numbers; the joints of one state take {per_state}")]
+    #[error("holds {}; the joints of one state take {per_state}", counted(*numbers, "number", "numbers"))]
     OneState {
         /// How many there are.
         numbers: usize,

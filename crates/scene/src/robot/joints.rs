@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sublevel_robot::{ConfigurationError, Kinematics};
+use sublevel_robot::{ConfigurationError, Kinematics, counted};
 
 /// Values of joints, by name.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,7 +42,7 @@ pub enum JointsError {
         name: Arc<str>,
     },
     /// Too few or too many values.
-    #[error("holds {given} values; the named joints take {width}")]
+    #[error("holds {}; the named joints take {width}", counted(*given, "value", "values"))]
     Width {
         /// How many were given.
         given: usize,
