@@ -34,7 +34,7 @@ pub(in crate::cli) struct RobotArgs {
     /// Folder for the bodies of the links; made with its parents when it is not there
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Degree of the body of each link: 2, 4, 6 or 8 [default: 6]
+    /// Degree of the body of each link, with refined volume: 2, 4, 6 or 8 [default: 6]
     #[arg(long, value_name = "N")]
     pub(super) degree: Option<usize>,
     /// How far a body may reach beyond the convex hull of its link, or of the parts of this: the

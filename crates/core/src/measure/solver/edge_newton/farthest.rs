@@ -19,6 +19,7 @@ use super::aggregate::{Evaluated, Weighted};
 use super::distance::VIOLATED;
 use super::linearized::Linearized;
 use super::quadratic_program::minimize;
+use super::set_distance::{DECISIVE, FLATTEST, SETTLED_SQUARED};
 use super::share_inside::share_inside;
 use crate::body::Body;
 use crate::measure::frames::vector::{
@@ -42,18 +43,6 @@ const MOST_PROGRAMS: usize = 4;
 /// Longer, values of high degrees grow too large to come back from in few rounds; shorter, more
 /// rounds lead along a side. `slab_cut_bodies_are_followed_to_their_edges` counts what is solved.
 const LONGEST_STEP: f64 = 0.5;
-
-/// Length of a step, as above, up to which its end is tried. No larger than a quarter: bounds of
-/// curvature hold as far from the body as that.
-const LONGEST_TRIED: f64 = 0.25;
-
-/// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
-/// It changes time only; no test pins it.
-const SETTLED_SQUARED: f64 = 1e-22;
-
-/// Curvature times size, dimensionless, that is added where there is none. It changes time only; no
-/// test pins it.
-const FLATTEST: f64 = 1e-10;
 
 /// Curvature times size, dimensionless, of the program for the first multipliers: its step is at
 /// most a tenth of the body, so that only constraints near the start count. It changes time only;
@@ -128,7 +117,7 @@ impl Search<'_> {
             if !square.is_finite() {
                 return Err(rounds);
             }
-            if square > LONGEST_TRIED * LONGEST_TRIED {
+            if square > DECISIVE * DECISIVE {
                 x = add_scaled::<S, f64>(x, (LONGEST_STEP / square.sqrt()).min(1.0), step);
                 continue;
             }

@@ -57,11 +57,11 @@ const MOST_CONTACTS: u32 = 1;
 
 /// Length of a step, as above, beyond which no bracket is expected to decide. No larger than a
 /// quarter: bounds of curvature hold as far from the body as that.
-const DECISIVE: f64 = 0.25;
+pub(super) const DECISIVE: f64 = 0.25;
 
 /// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
 /// It changes time only; no test pins it.
-const SETTLED_SQUARED: f64 = 1e-22;
+pub(super) const SETTLED_SQUARED: f64 = 1e-22;
 
 /// How much farther towards the interior point a common point is looked for than values ask for,
 /// dimensionless: they are convex along the way, and rounding counts. It changes time only; no test
@@ -75,7 +75,7 @@ const PATIENCE: u32 = 8;
 /// Curvature times size, dimensionless, that is added where there is none: far more than rounding
 /// leaves of that of a flat side, so that a program with no other curvature leads along the side to
 /// its end. It changes time only; no test pins it.
-const FLATTEST: f64 = 1e-10;
+pub(super) const FLATTEST: f64 = 1e-10;
 
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
