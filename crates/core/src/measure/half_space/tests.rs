@@ -32,7 +32,7 @@ fn supports_have_closed_forms() {
         (Body::cuboid("b", half).unwrap(), |h, n| h.dot(&n.abs())),
         (Body::cylinder("c", half.x, half.y).unwrap(), |h, n| h.x * n.x.hypot(n.y) + h.y * n.z.abs()),
     ];
-    let (mut most, mut total) = (0, 0);
+    let (mut most, mut smooth, mut edged) = (0, 0, 0);
     for seed in 0..3000 {
         let mut random = Seeded(seed);
         let (body, support) = &cases[(seed % 6) as usize];
@@ -56,11 +56,13 @@ fn supports_have_closed_forms() {
             assert!(found.lower <= truth + 1e-14 && truth - 1e-14 <= found.upper, "{label}");
             let height = half_space.normal().dot(&found.witness) - offset;
             assert!((height - found.upper).abs() < 1e-12, "{label}");
-            (most, total) = (most.max(found.iterations), total + found.iterations);
+            most = most.max(found.iterations);
+            *(if body.is_smooth() { &mut smooth } else { &mut edged }) += found.iterations;
         }
     }
-    // 24 507 evaluations, of bodies with edges of all constraints.
-    assert!(total < 25_000 && most <= 40, "{total}, most {most}");
+    // 19 034 evaluations, and of bodies with edges 5 473, of all constraints each.
+    println!("{smooth} and {edged} evaluations, most {most}");
+    assert!(smooth < 20_000 && smooth + edged < 25_000 && most <= 40, "{smooth} {edged}, most {most}");
 }
 
 #[test]
