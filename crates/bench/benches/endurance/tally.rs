@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Most failures kept word by word, of all blocks and of each.
-const KEPT: usize = 500;
+/// Most failures of a check kept word by word, of all blocks and of each.
+const KEPT: usize = 200;
 const KEPT_OF_A_BLOCK: usize = 10;
 
 /// Iterations that none should exceed.
@@ -114,7 +114,7 @@ pub(crate) struct Tally {
     pub(crate) checks: BTreeMap<Check, u64>,
     /// Failures.
     pub(crate) failures: BTreeMap<Check, u64>,
-    /// The first failures.
+    /// The first failures of each check.
     pub(crate) kept: Vec<Failure>,
     /// Of a block that is replayed, the solves that took most iterations, with their number.
     #[serde(skip)]
@@ -147,7 +147,7 @@ impl Tally {
         *self.checks.entry(check).or_default() += 1;
         if !passed {
             *self.failures.entry(check).or_default() += 1;
-            if self.kept.len() < KEPT_OF_A_BLOCK {
+            if self.kept.iter().filter(|kept| kept.check == check).count() < KEPT_OF_A_BLOCK {
                 self.kept.push(Failure { block, query, check, detail: detail() });
             }
         }
@@ -173,7 +173,12 @@ impl Tally {
         }
         self.kept.extend(other.kept);
         self.kept.sort();
-        self.kept.truncate(KEPT);
+        let mut counts = BTreeMap::new();
+        self.kept.retain(|failure| {
+            let count = counts.entry(failure.check).or_insert(0);
+            *count += 1;
+            *count <= KEPT
+        });
         self.deviation = self.deviation.max(other.deviation);
     }
 

@@ -201,8 +201,14 @@ impl<'a> Iterate<'a> {
         }
     }
 
-    /// One step; its length, NaN where the system is singular.
-    pub(super) fn step(&mut self, one: &Solid<'_>, two: &Solid<'_>, small: f64) -> f64 {
+    /// The largest entry of what the equations leave, dimensionless and in units of points. Steps
+    /// end without a solution, too, where the equations contradict each other.
+    pub(super) fn residual(&self, one: &Solid<'_>, two: &Solid<'_>) -> f64 {
+        self.system(one, two).1.iter().map(|entry| double(entry).abs()).fold(0.0, f64::max)
+    }
+
+    /// The matrix of a step and what the equations leave.
+    fn system(&self, one: &Solid<'_>, two: &Solid<'_>) -> (Vec<Vec<Big>>, Vec<Big>) {
         let Self { x, y, n, d, l, m, .. } = self;
         let (la, lb) = (l.len(), m.len());
         let size = 10 + la + lb;
@@ -237,6 +243,13 @@ impl<'a> Iterate<'a> {
         for (j, jet) in a.jets.iter().chain(&b.jets).enumerate() {
             r[10 + j] = big(1.0) - &jet.value;
         }
+        (k, r)
+    }
+
+    /// One step; its length, NaN where the system is singular.
+    pub(super) fn step(&mut self, one: &Solid<'_>, two: &Solid<'_>, small: f64) -> f64 {
+        let (k, r) = self.system(one, two);
+        let Self { x, y, n, d, l, m, .. } = self;
         let s = solve(k, r);
         let part = |from: usize| -> Vector { std::array::from_fn(|i| s[from + i].clone()) };
         let (dx, dy, dn) = (part(0), part(3), part(6));
