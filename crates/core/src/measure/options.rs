@@ -66,7 +66,8 @@ impl<'a> Options<'a> {
     /// The same with brackets at most this wide: relative to the circumradius of the smaller body
     /// for lengths, to `max(1, |d|)` for values without unit. Below the rounding floor no bracket
     /// gets, and the status says so: some 1e-13 of the larger body and of the distance between
-    /// both, 1e-12 where surfaces are flat.
+    /// both, 1e-12 where surfaces are flat; for distances of bodies from points and from capsules,
+    /// which go on in double-double arithmetic, a few spacings of doubles at the distance.
     ///
     /// # Errors
     /// An accuracy that is not above 0 and at most 1.

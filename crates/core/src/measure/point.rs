@@ -23,6 +23,7 @@ use crate::measure::solver::exact_shape::{
 use crate::measure::solver::projection::{
     Objective, Segment, Single, SingleProblem, Start, Trial, Worth, solve_single,
 };
+use crate::measure::solver::refinement::{Refined, RefinedAxis, RefinedOffset};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
@@ -109,7 +110,11 @@ pub fn distance_to_point(
     }
     let tolerance = options.accuracy() * solid.circumscribed().radius;
     Ok(match solid.parts() {
-        [body] => Projection::new(body, pose).to(point, tolerance, options, warm).into_distance(tolerance),
+        [body] => {
+            let projection = Projection::new(body, pose);
+            let found = projection.to(point, tolerance, options, warm);
+            projection.refined(found, point, tolerance, options).into_distance(tolerance)
+        }
         _ => nearest((solid, pose), point, tolerance, options, warm),
     })
 }
@@ -129,8 +134,10 @@ fn nearest(
         apart - ball.radius - error - CULLING_SLACK * (apart + ball.radius + ball.center.norm())
     };
     let (parts, end) = (solid.parts(), StopCriterion { near: 0.0, ..StopCriterion::NARROW });
-    let found = nearest_part(solid, bound, &end, warm, |part, _, hint| {
-        Projection::new(&parts[part], pose).to(point, tolerance, options, hint)
+    let found = nearest_part(solid, bound, &end, warm, |part, upper, hint| {
+        let projection = Projection::new(&parts[part], pose);
+        let found = projection.to(point, tolerance, options, hint);
+        if found.lower > upper { found } else { projection.refined(found, point, tolerance, options) }
     });
     let Least { best, lower, tied, iterations, .. } = found;
     let answer = Projected { lower, iterations, ..best }.into_distance(tolerance);
@@ -235,6 +242,35 @@ impl<'a> Projection<'a> {
         };
         let segment = Segment { center: *point, half_axis: Vector3::zeros() };
         self.to_segment((&segment, 0.0), (tolerance, &StopCriterion::NARROW), (spent, options), warm)
+    }
+
+    /// What was found of a point, in double-double arithmetic as well where rounding keeps it wider
+    /// than the tolerance, metres.
+    fn refined(&self, found: Projected, point: &Vector3<f64>, tolerance: f64, options: &Options<'_>) -> Projected {
+        let is_narrow = found.upper - found.lower <= tolerance;
+        if is_narrow || options.exhausted(found.iterations) || !runs(Stage::Refinement) {
+            return found;
+        }
+        self.with_more_digits(found, point, tolerance, options)
+    }
+
+    #[cold]
+    fn with_more_digits(
+        &self,
+        found: Projected,
+        point: &Vector3<f64>,
+        tolerance: f64,
+        options: &Options<'_>,
+    ) -> Projected {
+        let single = self.single.get_or_init(|| Single::new(self.body, &self.pose));
+        let axis = RefinedAxis::new(single, [0.0; 2], &Pose::identity().with_translation(*point));
+        let (near, _) = single.to_query(&found.witness);
+        let refined = axis.narrow([found.lower, found.upper], &near, tolerance, &options.after(found.iterations));
+        let Refined { lower, upper, at, steps } = refined;
+        let known = Projected { lower, upper, iterations: found.iterations + steps, ..found };
+        let Some(RefinedOffset { x, n, .. }) = at else { return known };
+        let normal = single.direction_to_world(&n);
+        Projected { plane: normal, normal, witness: single.to_world(&x), ..known }
     }
 
     /// Of a segment of the world frame that is known up to an error, metres, without closed forms
@@ -437,135 +473,4 @@ fn separation(body: &Posed<'_>, q: &Segment, error: f64, trial: &Trial) -> (f64,
 bracketed!(Projected);
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::body::Compound;
-    use crate::measure::tests::{random_pose, zoo};
-    use sublevel_testkit::Seeded;
-
-    fn cold(solid: &impl Solid, pose: &Pose, point: &Vector3<f64>) -> PointDistance {
-        distance_to_point(solid, pose, point, &Options::default(), &mut WarmStart::default()).unwrap()
-    }
-
-    #[test]
-    fn boxes_and_balls_have_closed_forms() {
-        let half = Vector3::new(0.5, 1.0, 3.0);
-        let bodies = [Body::cuboid("b", half).unwrap(), Body::ball("b", Vector3::zeros(), 1.5).unwrap()];
-        for seed in 0..3000 {
-            let mut random = Seeded(seed);
-            let body = &bodies[(seed % 2) as usize];
-            let pose = random_pose(&mut random, 2.0);
-            // Over faces, edges and corners, near and far, inside and out.
-            let x = Vector3::from_fn(|i, _| {
-                half[i]
-                    * [0.3, 0.99, 1.0 + 1e-9, 1.001, 2.0, 100.0][(random.next() % 6) as usize]
-                    * random.signed().signum()
-            });
-            let truth =
-                if seed % 2 == 0 { (x.abs() - half).map(|d| d.max(0.0)).norm() } else { (x.norm() - 1.5).max(0.0) };
-            let found = cold(body, &pose, &pose.transform_point(&x));
-            let label = format!("seed {seed}: {found:?} against {truth}");
-            let floor = 1e-14 * (x.norm() + 2.0);
-            assert_eq!(found.status, Status::Converged, "{label}");
-            assert!(found.lower <= truth + floor && truth - floor <= found.upper, "{label}");
-            assert!(!found.inside || truth <= floor, "{label}");
-            let is_well_inside = if seed % 2 == 0 { (x.abs() - half).max() < -1e-9 } else { x.norm() < 1.5 - 1e-9 };
-            assert!(found.inside || !is_well_inside, "{label}");
-            let reached = (pose.transform_point(&x) - found.witness).norm();
-            assert!((reached - found.upper).abs() <= 1e-12 * (1.0 + x.norm()), "{label}");
-        }
-    }
-
-    #[test]
-    fn projections_are_optimal() {
-        let zoos: Vec<_> = (0..6).map(|seed| zoo(&mut Seeded(seed))).collect();
-        let (mut most, mut total, mut count) = (0, 0, 0);
-        for seed in 0..3000 {
-            let mut random = Seeded(11_000 + seed);
-            let bodies = &zoos[(seed % 6) as usize];
-            let body = &bodies[random.next() as usize % bodies.len()];
-            let size = body.circumscribed().radius;
-            let pose = random_pose(&mut random, 1.0);
-            let x = body.circumscribed().center + random.unit() * size * 10_f64.powf(random.signed());
-            let mut warm = WarmStart::default();
-            for k in 0..3 {
-                let point = pose.transform_point(&x) + Vector3::new(0.01, 0.02, 0.0) * size * f64::from(k);
-                let found = distance_to_point(body, &pose, &point, &Options::default(), &mut warm).unwrap();
-                let label = format!("seed {seed} {} step {k}: {found:?}", body.name());
-                assert_eq!(found.status, Status::Converged, "{label}");
-                (most, total, count) = (most.max(found.iterations), total + found.iterations, count + 1);
-                let local = |v: &Vector3<f64>| pose.rotation().inverse_transform_vector(v);
-                assert!(body.value(&local(&(found.witness - pose.translation()))) <= 1.0 + 1e-9, "{label}");
-                assert_eq!(found.inside, body.value(&local(&(point - pose.translation()))) <= 1.0, "{label}");
-                if let Some(n) = found.normal {
-                    // No sampled point of the body is beyond the separating plane.
-                    let plane = n.dot(&point) - found.lower;
-                    for y in body.boundary() {
-                        assert!(n.dot(&pose.transform_point(y)) <= plane + 1e-9 * size, "{label}");
-                    }
-                }
-            }
-        }
-        assert!(total < 2 * count && most <= 60, "{total} of {count}, most {most}");
-    }
-
-    #[test]
-    fn gradients_are_differences() {
-        let zoos: Vec<_> = (0..4).map(|seed| zoo(&mut Seeded(seed))).collect();
-        let accurate = Options::default().with_accuracy(1e-13).unwrap();
-        for seed in 0..400 {
-            let mut random = Seeded(seed);
-            let bodies = &zoos[(seed % 4) as usize];
-            // Curved ones: the witness, and with it the gradient, is accurate to the root of the
-            // bracket elsewhere.
-            let body = &bodies[(seed as usize / 4) % 2];
-            let size = body.circumscribed().radius;
-            let pose = random_pose(&mut random, 1.0);
-            let point = pose.transform_point(&(body.circumscribed().center + random.unit() * 2.5 * size));
-            let value = |pose: &Pose| {
-                distance_to_point(body, pose, &point, &accurate, &mut WarmStart::default()).unwrap().value()
-            };
-            let found = distance_to_point(body, &pose, &point, &accurate, &mut WarmStart::default()).unwrap();
-            let gradient = found.pose_gradient(&pose).unwrap();
-            let h = 1e-4 * size;
-            for axis in 0..3 {
-                let e = Vector3::from_fn(|i, _| f64::from(u8::from(i == axis)));
-                let moved =
-                    |t: f64| Pose::from_quaternion(pose.translation() + e * t, pose.rotation().coords.into()).unwrap();
-                let turned = |t: f64| {
-                    let turn = nalgebra::UnitQuaternion::from_scaled_axis(e * t) * pose.rotation();
-                    Pose::from_quaternion(*pose.translation(), turn.coords.into()).unwrap()
-                };
-                let slope = (value(&moved(h)) - value(&moved(-h))) / (2.0 * h);
-                assert!((slope - gradient.linear[axis]).abs() < 1e-5, "seed {seed}: {slope} {gradient:?}");
-                let slope = (value(&turned(1e-4)) - value(&turned(-1e-4))) / 2e-4;
-                assert!(
-                    (slope - gradient.angular[axis]).abs() < 1e-5 * (1.0 + size),
-                    "seed {seed}: {slope} {gradient:?}"
-                );
-            }
-        }
-    }
-
-    #[test]
-    fn the_nearest_part_counts_and_points_are_checked() {
-        let at = |x: f64| Body::ball("part", Vector3::new(x, 0.0, 0.0), 1.0).unwrap();
-        let row = Compound::new("row", vec![at(0.0), at(5.0), at(10.0)]).unwrap();
-        let mut warm = WarmStart::default();
-        for k in 0..120 {
-            let x = -1.0 + 0.1 * f64::from(k);
-            let point = Vector3::new(x, 3.0, 0.0);
-            let truth = [0.0, 5.0, 10.0].map(|c| (x - c).hypot(3.0) - 1.0).into_iter().fold(f64::MAX, f64::min);
-            let found = distance_to_point(&row, &Pose::identity(), &point, &Options::default(), &mut warm).unwrap();
-            assert!(
-                (found.value() - truth).abs() < 1e-8 && found.lower <= truth && truth <= found.upper,
-                "{x}: {found:?}"
-            );
-        }
-        for bad in [f64::NAN, f64::INFINITY, 1e16] {
-            let point = Vector3::new(0.0, bad, 0.0);
-            let found = distance_to_point(&row, &Pose::identity(), &point, &Options::default(), &mut warm);
-            assert_eq!(found.unwrap_err(), PointError);
-        }
-    }
-}
+mod tests;

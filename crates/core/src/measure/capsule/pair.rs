@@ -1,5 +1,5 @@
 //! The signed distance of one body from a capsule: by closed forms, else by the projection of its
-//! axis on the body, and where rounding ends that along the axis.
+//! axis on the body, and where rounding ends that along the axis and in double-double arithmetic.
 
 use super::answer::CapsuleDistance;
 use super::axes::{Axis, of_axes};
@@ -15,7 +15,8 @@ use crate::measure::solver::edge_newton::{EdgeShapeProven, EdgeShapeQuery, EdgeS
 use crate::measure::solver::exact_shape::{
     ExactProven, ExactQuery, ShapeDistance, between_shapes, direction_to_world, to_world,
 };
-use crate::measure::solver::projection::Segment;
+use crate::measure::solver::projection::{Segment, Single};
+use crate::measure::solver::refinement::{Refined, RefinedAxis, RefinedOffset};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::status::Status;
@@ -26,20 +27,13 @@ use nalgebra::Vector3;
 /// Most places along a segment at which the distance is taken.
 const MAX_PLACES: u32 = 64;
 
-/// Widths of brackets, relative to the larger of both and their distance, dimensionless, that
-/// rounding may leave: as `Options::with_accuracy` states them in general and of flat surfaces.
+/// Width of a bracket, relative to the larger of both and their distance, dimensionless, that the
+/// projection of the axis is asked for where the tolerance may be below what doubles can prove;
+/// refinement goes on from there.
 ///
-/// Smaller, pairs that rounding keeps wide take hundreds of iterations more and end no narrower;
-/// larger, they end wider than need be. Exercised by `family_13_parallel_flats_of_primitives`.
-const ROUNDING_FLOORS: [f64; 2] = [1e-13, 1e-12];
-
-/// Width of a bracket at a rounding floor, relative to the distance, dimensionless, beyond which
-/// the places along the axis are tried as well: they lose fewer digits near contact.
-///
-/// Larger, distances near contact are known less well than they might be; smaller, pairs farther
-/// apart take longer for digits that nobody asked for. Exercised by
-/// `family_09_size_ratio_of_primitives`.
-const FEW_DIGITS: f64 = 1e-3;
+/// Smaller, the projection takes steps that rounding keeps wide; larger, refinement starts farther
+/// from the solution. Exercised by `family_13_parallel_flats_of_primitives`.
+const ROUNDING_FLOOR: f64 = 1e-12;
 
 /// Largest derivative of the distance along the axis, dimensionless, at a place that counts as the
 /// nearest one in its middle: gradients are off by about as much, and 1e-6 is promised.
@@ -90,48 +84,59 @@ impl Problem<'_> {
     }
 
     fn search(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
-        match self.by_newton(of_body, self.tolerance, self.options, warm) {
-            Ok(found) => found,
+        match self.by_newton(of_body, warm) {
+            Ok(found) => self.refined(of_body, found),
             Err(spent) => self.beyond_newton(of_body, spent, warm),
         }
     }
 
-    /// Where Newton's method has not found a bracket as narrow as asked for: one as narrow as
-    /// rounding leaves, or along the axis.
+    /// Where Newton's method has not found a bracket as narrow as asked for: from the projection of
+    /// the axis if rounding may be the reason, or along the axis.
     #[cold]
     fn beyond_newton(&self, of_body: At<'_, Body>, mut spent: u32, warm: &mut WarmStart) -> CapsuleDistance {
-        let size = self.size(of_body);
-        // From nothing but the poses, too: where rounding ends a search depends on its start.
-        let starts = [*warm, WarmStart::default()];
-        let starts = if matches!(warm.hint, Hint::Cold) { &starts[..1] } else { &starts };
-        for floor in ROUNDING_FLOORS.map(|floor| floor * size) {
-            for start in starts {
-                if floor > self.tolerance && self.goal.wants_answer() && !self.options.exhausted(spent) {
-                    *warm = *start;
-                    match self.by_newton(of_body, floor, &self.options.after(spent), warm) {
-                        Ok(found) => {
-                            let found = CapsuleDistance { iterations: found.iterations + spent, ..found };
-                            return self.with_more_digits(of_body, found);
-                        }
-                        Err(more) => spent += more,
-                    }
-                }
+        let floor = ROUNDING_FLOOR * self.size(of_body);
+        if floor > self.tolerance && self.goal.wants_answer() && !self.options.exhausted(spent) {
+            let found = self.by_projection(of_body, floor, spent, warm);
+            let found = self.refined(of_body, found);
+            if found.upper - found.lower <= floor || self.is_decided(&found) {
+                return found;
             }
+            spent = found.iterations;
         }
-        self.along_axis(of_body, spent, warm)
+        self.refined(of_body, self.along_axis(of_body, spent, warm))
     }
 
-    /// The answer, near contact inside the bracket along the axis as well: both are proven.
-    fn with_more_digits(&self, of_body: At<'_, Body>, found: CapsuleDistance) -> CapsuleDistance {
-        let CapsuleDistance { lower, upper, iterations, .. } = found;
-        if !(lower.is_finite() && upper - lower > FEW_DIGITS * upper.abs()) || self.options.exhausted(iterations) {
-            return found;
-        }
-        let other = self.along_axis(of_body, iterations, &mut WarmStart::default());
-        let (lower, upper) = (lower.max(other.lower), upper.min(other.upper));
-        let attained = if other.upper < found.upper { other } else { found };
+    /// Whether an answer says what is asked, or that the axis meets the body, beyond which nothing
+    /// is measured.
+    fn is_decided(&self, found: &CapsuleDistance) -> bool {
+        self.goal.met(found.lower, found.upper) || found.upper <= -self.capsule.radius_m()
+    }
+
+    /// An answer that is asked for, in double-double arithmetic as well where it is wider than the
+    /// tolerance.
+    fn refined(&self, of_body: At<'_, Body>, found: CapsuleDistance) -> CapsuleDistance {
+        let is_open = found.upper - found.lower > self.tolerance && !self.is_decided(&found);
+        let may_go_on = self.goal.wants_answer() && !self.options.exhausted(found.iterations);
+        if is_open && may_go_on && runs(Stage::Refinement) { self.with_more_digits(of_body, found) } else { found }
+    }
+
+    /// The answer inside the bracket in double-double arithmetic as well: both are proven.
+    #[cold]
+    fn with_more_digits(&self, (body, pose): At<'_, Body>, found: CapsuleDistance) -> CapsuleDistance {
+        let single = Single::new(body, pose);
+        let [radius, half] = [self.capsule.radius_m(), self.capsule.half_height_m()];
+        let axis = RefinedAxis::new(&single, [radius, half], self.capsule_pose);
+        let (near, _) = single.to_query(&found.witness);
+        let options = self.options.after(found.iterations);
+        let refined = axis.narrow([found.lower, found.upper], &near, self.tolerance, &options);
+        let Refined { lower, upper, at, steps } = refined;
         let status = Status::of(upper - lower <= self.tolerance);
-        CapsuleDistance { status, lower, upper, iterations: other.iterations, ..attained }
+        let known = CapsuleDistance { status, lower, upper, iterations: found.iterations + steps, ..found };
+        let Some(RefinedOffset { x, place, n, .. }) = at else { return known };
+        let normal = -single.direction_to_world(&n);
+        let on_axis = self.capsule_pose.transform_point(&Vector3::new(0.0, 0.0, half * place));
+        let witness_of_capsule = on_axis + normal * radius;
+        CapsuleDistance { witness: single.to_world(&x), witness_of_capsule, normal: Some(normal), ..known }
     }
 
     /// What rounding of coordinates grows with, metres: the larger of both and how far they are
@@ -141,17 +146,11 @@ impl Problem<'_> {
         self.capsule.reach_m().max(body.circumscribed().radius) + between.norm()
     }
 
-    /// In a bracket of this width, metres.
+    /// In a bracket as narrow as asked for; of balls in one as narrow as rounding allows.
     ///
     /// # Errors
     /// After how many iterations nothing is proven, or nothing as narrow.
-    fn by_newton(
-        &self,
-        of_body: At<'_, Body>,
-        width: f64,
-        options: &Options<'_>,
-        warm: &mut WarmStart,
-    ) -> Result<CapsuleDistance, u32> {
+    fn by_newton(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
         if !runs(Stage::ClosedForm) {
             Err(0)
         } else if let Some(form) = of_body.0.closed_form() {
@@ -160,12 +159,12 @@ impl Problem<'_> {
                     *warm = WarmStart::default();
                     Ok(of_axes(&ball, &Axis::of_capsule(self.capsule, self.capsule_pose), self.tolerance))
                 }
-                None => self.of_shape((form, of_body.1), (width, options), warm),
+                None => self.of_shape((form, of_body.1), warm),
             }
         } else if of_body.0.is_smooth() {
-            self.of_smooth(of_body, (width, options), warm)
+            self.of_smooth(of_body, warm)
         } else {
-            self.of_edged(of_body, (width, options), warm)
+            self.of_edged(of_body, warm)
         }
     }
 
@@ -173,12 +172,8 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many evaluations nothing is proven.
-    fn of_smooth(
-        &self,
-        (body, pose): At<'_, Body>,
-        (tolerance, options): (f64, &Options<'_>),
-        warm: &mut WarmStart,
-    ) -> Result<CapsuleDistance, u32> {
+    fn of_smooth(&self, (body, pose): At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+        let Self { tolerance, options, .. } = *self;
         let form_pose = self.capsule_pose;
         let (form, goal) = (self.capsule.closed_form(), self.goal.beyond_radius(self.capsule.radius_m()));
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
@@ -206,21 +201,15 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many steps nothing is proven.
-    fn of_edged(
-        &self,
-        (body, pose): At<'_, Body>,
-        (width, options): (f64, &Options<'_>),
-        warm: &mut WarmStart,
-    ) -> Result<CapsuleDistance, u32> {
-        let (form_pose, form, goal) =
-            (self.capsule_pose, self.capsule.closed_form(), self.goal.beyond_radius(self.capsule.radius_m()));
+    fn of_edged(&self, (body, pose): At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+        let Self { capsule_pose: form_pose, tolerance, options, .. } = *self;
+        let (form, goal) = (self.capsule.closed_form(), self.goal.beyond_radius(self.capsule.radius_m()));
         let start = match &warm.hint {
             Hint::EdgeShape(trace) => EdgeShapeStart::Last(trace),
             Hint::Single { y, .. } => EdgeShapeStart::Witness(*y),
             _ => EdgeShapeStart::Cold,
         };
-        let query =
-            EdgeShapeQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance: width, options, start };
+        let query = EdgeShapeQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, start };
         let spent = match dispatch(query) {
             Ok(found) => {
                 let EdgeShapeProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
@@ -233,25 +222,36 @@ impl Problem<'_> {
             }
             Err(rounds) => rounds,
         };
+        let found = self.by_projection((body, pose), tolerance, spent, warm);
+        let is_narrow = found.upper - found.lower <= tolerance;
+        if is_narrow || self.is_decided(&found) { Ok(found) } else { Err(found.iterations) }
+    }
+
+    /// By the projection of the axis on the body, which is asked for a bracket of this width,
+    /// metres, after so many steps.
+    fn by_projection(
+        &self,
+        (body, pose): At<'_, Body>,
+        width: f64,
+        spent: u32,
+        warm: &mut WarmStart,
+    ) -> CapsuleDistance {
+        let goal = self.goal.beyond_radius(self.capsule.radius_m());
         let SeenAxis { origin, center, half_axis, error } = self.axis(pose);
         let pose = pose.with_translation(Vector3::zeros());
         let wants_normal = self.goal.wants_answer();
         let projection = if wants_normal { Projection::new(body, &pose) } else { Projection::rough(body, &pose) };
         let segment = Segment { center, half_axis };
         // The radius is subtracted with rounding.
-        let found = projection.to_segment((&segment, error), (0.5 * width, &goal), (spent, options), warm);
+        let found = projection.to_segment((&segment, error), (0.5 * width, &goal), (spent, self.options), warm);
         if found.upper == 0.0 {
-            return Ok(self.met(&(found.nearest + origin), found.iterations));
-        }
-        let is_outside = found.lower > 0.0;
-        if !(goal.met(found.lower, found.upper) || is_outside && found.upper - found.lower <= width) {
-            return Err(found.iterations);
+            return self.met(&(found.nearest + origin), found.iterations);
         }
         let witnesses = [found.witness + origin, found.nearest + origin];
         let answer = self.apart([found.lower, found.upper], witnesses, -found.normal, found.iterations);
         // How deep an axis is that is not proven outside is not known.
         let unknown = CapsuleDistance { lower: f64::NEG_INFINITY, status: Status::BracketWide, ..answer };
-        Ok(if is_outside { answer } else { unknown })
+        if found.lower > 0.0 { answer } else { unknown }
     }
 
     /// The axis as seen from the translation of a pose, for the sake of digits.
@@ -268,16 +268,12 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many steps nothing is proven.
-    fn of_shape(
-        &self,
-        of_body: (&ClosedForm, &Pose),
-        (width, options): (f64, &Options<'_>),
-        warm: &mut WarmStart,
-    ) -> Result<CapsuleDistance, u32> {
-        let (_, pose) = of_body;
+    fn of_shape(&self, of_body: (&ClosedForm, &Pose), warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+        let ((_, pose), form_pose, goal) = (of_body, self.capsule_pose, &self.goal);
         let form = self.capsule.closed_form();
         let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose.transform_point(x_a)) } else { None };
-        let found = between_shapes(of_body, (&form, self.capsule_pose), start.as_ref(), &self.goal, (width, options))?;
+        let effort = (self.tolerance, self.options);
+        let found = between_shapes(of_body, (&form, form_pose), start.as_ref(), goal, effort)?;
         let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;
         let x_a = pose.rotation().inverse_transform_vector(&(witness_a - pose.translation()));
         *warm = Hint::Shapes { x_a }.into();

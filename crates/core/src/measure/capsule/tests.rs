@@ -1,9 +1,9 @@
 use super::*;
 use crate::body::Body;
-use crate::measure::solver::stages::{Stage, asked};
-use crate::measure::tests::edges::cut;
+use crate::measure::solver::stages::{Stage, asked, except};
+use crate::measure::tests::edges::{cut, slab};
 use crate::measure::tests::{random_pose, twisted, zoo};
-use crate::measure::{Decision, Status, Twist, distance_to_point};
+use crate::measure::{Decision, MAX_ITERATIONS, Status, Twist, distance_to_point};
 use nalgebra::Vector3;
 use sublevel_testkit::Seeded;
 
@@ -193,4 +193,139 @@ fn segments_through_edges_overlap_and_the_shortest_are_points() {
         assert!((one.upper - other.upper).abs() < 1e-9 && one.iterations <= other.iterations + 2, "seed {seed}");
     }
     assert!(overlaps > count * 9 / 10, "{overlaps} of {count}");
+}
+
+/// A body and a capsule, and in the frame of the body, as it stands unturned: the nearest point of
+/// the axis but for its distance, the direction to it, of length 3, and whether the axis is along z
+/// or along (2, -2, -1), both across the direction.
+struct Beside {
+    body: Body,
+    capsule: Capsule,
+    nearest: Vector3<f64>,
+    normal: Vector3<f64>,
+    along_z: bool,
+}
+
+impl Beside {
+    /// Poses of the body and the capsule at this distance of the axis, metres, in exact numbers, and
+    /// the normal from the capsule to the body; both turned by a quarter about z, or not.
+    fn at(&self, distance: f64, is_turned: bool) -> (Pose, Pose, Vector3<f64>) {
+        // Rotations are of quaternions normalised exactly.
+        let [third, sixth, half] = [3.0_f64, 6.0, 2.0].map(|square| 1.0 / square.sqrt());
+        let turn = if is_turned { [0.0, 0.0, half, half] } else { [0.0, 0.0, 0.0, 1.0] };
+        let capsule_turn = match (self.along_z, is_turned) {
+            (true, _) => [0.0, 0.0, 0.0, 1.0],
+            (false, false) => [third, third, 0.0, third],
+            (false, true) => [0.0, 2.0 * sixth, sixth, sixth],
+        };
+        let axis = if self.along_z { Vector3::z() } else { Vector3::new(2.0, -2.0, -1.0) };
+        // Off the middle of the axis.
+        let off = axis * (self.capsule.half_height_m() * 0.125);
+        let center = self.nearest + self.normal * (distance / 3.0) + off;
+        let turned = |v: &Vector3<f64>| if is_turned { Vector3::new(-v.y, v.x, v.z) } else { *v };
+        let place = Vector3::new(512.0, -2048.0, 1024.0);
+        let pose = Pose::from_quaternion(place, turn).unwrap();
+        let capsule_pose = Pose::from_quaternion(place + turned(&center), capsule_turn).unwrap();
+        (pose, capsule_pose, turned(&self.normal) / -3.0)
+    }
+}
+
+/// A body, and the same with a further constraint that does not matter: twice as wide, or on the
+/// other side.
+fn with_another(body: Body, a: Vector3<f64>, b: f64) -> [Body; 2] {
+    let constraints = body.constraints().iter().cloned().chain([slab(&a, b)]).collect();
+    let other = Body::new("cut", *body.normalization(), constraints).unwrap();
+    [body, other]
+}
+
+/// Bodies of 1 cm beside capsules of 100 m, and the other way around. Sizes are powers of two, or
+/// so small that the rounding of their inverses, 1e-18 m, is far below that of distances.
+fn pairs_of_unlike_sizes() -> Vec<Beside> {
+    let oblique = Vector3::new(2.0, 1.0, 2.0);
+    let mut pairs = Vec::new();
+    let mut add = |bodies: [Body; 2], capsule: Capsule, nearest: Vector3<f64>, normal: Vector3<f64>, along_z: bool| {
+        pairs.extend(bodies.map(|body| Beside { body, capsule, nearest, normal, along_z }));
+    };
+    let (u, large) = (1.0 / 2048.0, Capsule::new(0.5, 128.0).unwrap());
+    let pebble = Body::ellipsoid("pebble", Vector3::zeros(), Vector3::new(7.0, 21.0, 21.0) * u).unwrap();
+    add(with_another(pebble, Vector3::x(), 0.5), large, Vector3::new(2.0, 9.0, 18.0) * u, oblique, false);
+    let dice = Body::cuboid("dice", Vector3::new(16.0, 8.0, 32.0) * u).unwrap();
+    add(with_another(dice, Vector3::x() * 0.5, 0.0), large, Vector3::new(16.0, 8.0, 32.0) * u, oblique, false);
+    let marble = Body::ball("marble", Vector3::zeros(), 21.0 * u).unwrap();
+    add(with_another(marble, Vector3::x(), 0.5), large, Vector3::new(14.0, 7.0, 14.0) * u, oblique, false);
+
+    let small = Capsule::new(1.0 / 256.0, 1.0 / 128.0).unwrap();
+    let half = Vector3::new(64.0, 32.0, 16.0);
+    let house = Body::cuboid("house", half).unwrap();
+    add(with_another(house, Vector3::x() * 0.5, 0.0), small, half, oblique, false);
+    let hill = Body::ellipsoid("hill", Vector3::zeros(), half).unwrap();
+    let top = Vector3::new(64.0, 0.0, 0.0);
+    add(with_another(hill, Vector3::x(), 0.5), small, top, Vector3::x() * 3.0, true);
+    pairs
+}
+
+#[test]
+fn capsules_of_unlike_sizes_have_narrow_brackets() {
+    let options = Options::default();
+    let (mut wide, mut count) = (0, 0);
+    for beside in pairs_of_unlike_sizes() {
+        let Beside { body, capsule, .. } = &beside;
+        for (distance, is_turned) in [0.75, 96.0, 1536.0, 9216.0].into_iter().flat_map(|d| [(d, false), (d, true)]) {
+            let (pose, capsule_pose, normal) = beside.at(distance, is_turned);
+            let truth = distance - capsule.radius_m();
+            let solve = |warm: &mut WarmStart| distance_to_capsule(body, &pose, capsule, &capsule_pose, &options, warm);
+            let mut warm = WarmStart::default();
+            for round in 0..2 {
+                let found = solve(&mut warm);
+                let label = format!("{}, {truth} m, turned {is_turned}, round {round}: {found:?}", body.name());
+                assert_eq!(found.status, Status::Converged, "{label}");
+                assert!(found.lower <= truth && truth <= found.upper, "{label}");
+                assert!((found.normal.unwrap() - normal).norm() < 1e-6, "{label}");
+                let along = (found.witness - found.witness_of_capsule).dot(&normal);
+                assert!((along - truth).abs() <= 1e-10 + 8.0 * f64::EPSILON * (distance + 4096.0), "{label}");
+            }
+            let without = except(&[Stage::Refinement], || solve(&mut WarmStart::default()));
+            assert!(without.lower <= truth && truth <= without.upper, "{}: {without:?}, {truth}", body.name());
+            wide += u32::from(without.status == Status::BracketWide);
+            count += 1;
+        }
+    }
+    assert!(4 * wide >= count, "{wide} of {count} are wide without refinement");
+}
+
+/// Narrower than doubles are spaced there is no bracket.
+#[test]
+fn brackets_of_capsules_end_where_doubles_do() {
+    let options = Options::default().with_accuracy(1e-18).unwrap();
+    for beside in pairs_of_unlike_sizes() {
+        let Beside { body, capsule, .. } = &beside;
+        let (distance, mut warm) = (1536.0, WarmStart::default());
+        let (pose, capsule_pose, _) = beside.at(distance, true);
+        let truth = distance - capsule.radius_m();
+        let found = distance_to_capsule(body, &pose, capsule, &capsule_pose, &options, &mut warm);
+        let label = format!("{}: {found:?} against {truth}", body.name());
+        assert_eq!(found.status, Status::BracketWide, "{label}");
+        assert!(found.lower <= truth && truth <= found.upper, "{label}");
+        assert!(found.upper - found.lower <= 4.0 * f64::EPSILON * truth, "{label}");
+        assert!(found.iterations < MAX_ITERATIONS / 2, "{label}");
+    }
+}
+
+/// A long axis across the tip of a needle: where the normal turns by 1e-10 for what doubles round,
+/// the ends of the axis move by more than is asked for.
+#[test]
+fn axes_across_needles_have_narrow_brackets() {
+    let half = Vector3::new(1.0 / 16384.0, 1.0 / 16384.0, 1.0 / 128.0);
+    let needle = Body::ellipsoid("needle", Vector3::zeros(), half).unwrap();
+    let capsule = Capsule::new(0.5, 128.0).unwrap();
+    let eighth = std::f64::consts::FRAC_1_SQRT_2;
+    for distance in [1.0, 96.0, 1536.0, 9216.0] {
+        // Its axis along x.
+        let center = Vector3::new(16.0, 0.0, half.z + distance);
+        let capsule_pose = Pose::from_quaternion(center, [0.0, eighth, 0.0, eighth]).unwrap();
+        let (pose, mut warm) = (Pose::identity(), WarmStart::default());
+        let found = distance_to_capsule(&needle, &pose, &capsule, &capsule_pose, &Options::default(), &mut warm);
+        assert_eq!(found.status, Status::Converged, "{found:?}");
+        assert!(found.lower <= distance - 0.5 && distance - 0.5 <= found.upper, "{distance}: {found:?}");
+    }
 }

@@ -36,8 +36,9 @@ pub(in crate::measure) struct Single<'a> {
     pub(in crate::measure) body: Posed<'a>,
     /// Metres per unit of the query frame: a power of two.
     pub(in crate::measure) unit: f64,
-    origin: Vector3<f64>,
-    pose: Pose,
+    /// Origin of the query frame in the body frame, metres.
+    pub(in crate::measure) origin: Vector3<f64>,
+    pub(in crate::measure) pose: Pose,
 }
 
 impl<'a> Single<'a> {
