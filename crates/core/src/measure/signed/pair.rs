@@ -48,6 +48,8 @@ pub(super) fn between(
             Err(lost) => spent += lost.rounds,
         }
     }
+    // Near contact a part of the width is left to each end of the bracket.
+    let finer = options.with_accuracy(0.25 * options.accuracy()).unwrap_or(*options);
     let pair = Pair::new(a, pose_a, b, pose_b);
     let mut best = Best::new(&pair, pose_a, pose_b, options);
     best.iterations = spent;
@@ -58,7 +60,7 @@ pub(super) fn between(
     let mut known = Known::of(&best);
     if best.depth.is_infinite() {
         // No answer to continue from: the distance decides whether the bodies are apart.
-        let apart = distance(a, pose_a, b, pose_b, options, warm);
+        let apart = distance(a, pose_a, b, pose_b, &options.after(best.iterations), warm);
         best.iterations += apart.iterations;
         if apart.lower > 0.0 {
             let iterations = best.iterations;
@@ -96,16 +98,27 @@ pub(super) fn between(
     if let Some(hint) = best.hint() {
         *warm = hint;
     }
-    if known.lower > 0.0 && !known.narrow(&best) {
-        let apart = distance(a, pose_a, b, pose_b, options, warm);
-        let answer = Answer {
-            lower: apart.lower.max(known.lower * pair.unit()),
-            upper: apart.upper,
-            tied,
-            iterations: best.iterations + apart.iterations,
-            status: apart.status,
-        };
-        return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
+    if known.upper > 0.0 && !known.narrow(&best) {
+        // On which side of contact the bodies are is not known, or how far apart.
+        let apart = distance(a, pose_a, b, pose_b, &finer.after(best.iterations), warm);
+        best.iterations += apart.iterations;
+        if apart.lower > 0.0 {
+            let lower = apart.lower.max(known.lower * pair.unit());
+            let status = Status::of(apart.upper - lower <= tolerance);
+            let answer = Answer { lower, upper: apart.upper, tied, iterations: best.iterations, status };
+            return answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b);
+        }
+        if !options.exhausted(best.iterations) {
+            best.options = &finer;
+            best.follow(&warm.hint);
+            best.options = options;
+        }
+        known.lower = known.lower.max(-best.depth);
+        known.attain(
+            apart.upper / pair.unit(),
+            pair.world_to_query(&apart.witness_a),
+            pair.world_to_query(&apart.witness_b),
+        );
     }
     let status = Status::of(known.narrow(&best));
     let unit = pair.unit();
