@@ -295,8 +295,17 @@ fn no_batch_allocates() {
     let pile = Compound::new("pile", vec![crate_.clone(), beside]).unwrap();
     let capsule = Capsule::new(0.1, 0.3).unwrap();
     let options = Options::default();
-    let lanes = [(chair, human), (chair, &crate_), (&can, chair), (chair, &balls[0]), (&balls[0], &balls[1])];
-    let alone = [(&crate_, &can), (&sliced, chair), (&sliced, &sliced)];
+    let lanes = [
+        (chair, human),
+        (chair, &crate_),
+        (&can, chair),
+        (chair, &balls[0]),
+        (&balls[0], &balls[1]),
+        (&crate_, &can),
+        (&crate_, &crate_),
+        (&can, &can),
+    ];
+    let alone = [(&sliced, chair), (&sliced, &sliced), (&sliced, &crate_)];
     for (a, b) in lanes {
         assert!(is_solved_in_lanes(a, b), "{} and {}", a.name(), b.name());
     }

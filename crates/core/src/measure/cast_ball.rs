@@ -2,15 +2,14 @@
 //!
 //! The distance of the moving centre from the body is a convex function of the path, and a plane
 //! that separates the centre from the body at one place bounds it everywhere: its lower bound there
-//! is the value, and the normal times the direction the slope, of a tangent of [`Entry`]. So the
+//! is the value, and the normal times the direction the slope, of a tangent of `Entry`. So the
 //! touch is found like the entry of a ray, from projections of the centre.
 
 use crate::body::{Body, Solid};
-use crate::measure::cast_ray::{Ray, RayCast, RayError, RayHit, ShapeEntry, enter, first_hit};
+use crate::measure::cast_ray::{Approach, MAX_STEPS, Ray, RayCast, RayError, RayHit, ShapeEntry, enter, first_hit};
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::options::Options;
 use crate::measure::point::Projection;
-use crate::measure::solver::convex_root_bracket::Entry;
 use crate::measure::solver::exact_shape::{PointOffset, PointSide, offset_of_point};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
@@ -58,17 +57,16 @@ pub fn cast_ball(solid: &impl Solid, pose: &Pose, sweep: &Sweep, options: &Optio
     })
 }
 
-/// Most projections along one path; 3 to 6 are usual.
-const MAX_STEPS: u32 = 64;
-
 fn cast_at(body: &Body, pose: &Pose, sweep: &Sweep, tolerance: f64, options: &Options<'_>) -> RayCast {
     let Sweep { ray, radius } = sweep;
     if let Some(found) = at_shape(body, pose, sweep, tolerance, options) {
         return found;
     }
-    let (base, mut entry) = match within_ball(body, pose, sweep) {
-        Some(found) => found,
-        None => return RayCast::Miss,
+    // Where the swept ball touches the circumscribed one.
+    let ball = body.circumscribed();
+    let approach = Approach::within(ball.radius + radius, &ball.center, pose, ray);
+    let Some(Approach { base, mut entry, .. }) = approach.filter(|approach| !approach.entry.missed()) else {
+        return RayCast::Miss;
     };
     let projection = Projection::rough(body, pose);
     let mut warm = WarmStart::default();
@@ -154,25 +152,6 @@ fn at_shape(
         PointSide::Open => return None,
     };
     Some(RayCast::Hit(RayHit { status: Status::Converged, lower, upper, point, normal, iterations: 0 }))
-}
-
-/// The parameter of the ray closest to the centre of the circumscribed ball, and the interval about
-/// it in which the swept ball touches that ball; none if it never does.
-fn within_ball(body: &Body, pose: &Pose, sweep: &Sweep) -> Option<(f64, Entry)> {
-    let Sweep { ray, radius } = sweep;
-    let ball = body.circumscribed();
-    let from_ball = ray.origin() - pose.transform_point(&ball.center);
-    let base = -from_ball.dot(ray.direction());
-    let closest = from_ball + ray.direction() * base;
-    let size = ray.origin().norm() + pose.translation().norm() + ball.center.norm() + base.abs();
-    let reach = (ball.radius + radius) * (1.0 + 1e-14) + (ROTATION_ERROR + gamma(32)) * size;
-    let half = reach * reach - closest.norm_squared();
-    if half < 0.0 {
-        return None;
-    }
-    let half = half.sqrt() * (1.0 + 1e-14) + (ROTATION_ERROR + gamma(32)) * size;
-    let entry = Entry::between((-half).max(-base), half.min(ray.max_length() - base));
-    (!entry.missed()).then_some((base, entry))
 }
 
 #[cfg(test)]

@@ -36,7 +36,9 @@ mod time_of_impact;
 mod translation_hessian;
 mod warm;
 
-pub use batch::{BatchError, distance_batch, distance_to_capsule_batch, is_solved_in_lanes};
+pub use batch::{
+    BatchError, distance_batch, distance_to_capsule_batch, is_capsule_solved_in_lanes, is_solved_in_lanes,
+};
 pub use capsule::{
     Capsule, CapsuleDistance, CapsuleError, capsules_nearer_than, capsules_within_margin, distance_of_capsules,
     distance_to_capsule, nearer_to_capsule_than, overlap_of_capsules, overlap_with_capsule, within_margin_of_capsule,

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use sublevel_core::body::{Shape, Solid};
+use sublevel_core::body::Shape;
 use sublevel_core::measure::{
     Capsule, CapsuleDistance, DEFAULT_ACCURACY, DEFAULT_DEPTH_ACCURACY, Distance, Options, Pose, WithinMargin,
-    distance_batch, distance_to_capsule_batch, is_solved_in_lanes, within_margin,
+    distance_batch, distance_to_capsule_batch, is_capsule_solved_in_lanes, is_solved_in_lanes, within_margin,
 };
 
 use super::answer::{Answer, Verdict};
@@ -361,8 +361,7 @@ impl<'a> LanePair<'a> {
 
     fn of_capsule(body: &'a Shape, other: &Thing<'a>, moves: bool) -> Option<Self> {
         let Thing::Capsule { capsule, .. } = other else { return None };
-        let is_smooth = matches!(body.parts(), [body] if body.is_smooth());
-        is_smooth.then_some(Self::Capsule { body, capsule, moves })
+        is_capsule_solved_in_lanes(body, capsule).then_some(Self::Capsule { body, capsule, moves })
     }
 
     /// Measured with the moving one at these poses and the other one at this.

@@ -1,7 +1,7 @@
 //! Balls beside boxes, cylinders and other balls at several poses at once: the projection of the
 //! ball's centre is all there is to find.
 
-use super::shapes::{ShapeAnswers, ShapeBatch};
+use super::shapes::{ShapeAnswers, ShapeBatch, write};
 use super::waiting::Group;
 use crate::measure::frames::vector::{add_scaled, dot};
 use crate::measure::solver::exact_shape::{LaneBracket, LaneSet};
@@ -70,7 +70,7 @@ impl<P: LaneSet, A: ShapeAnswers> BallBatch<'_, P, A> {
         let x = add_scaled(x, splat(-self.radius), n);
         // The gradient of |z|² / r² is 2 / r there.
         let multiplier = splat(0.5 * self.radius);
-        self.batch.write(group, proven, &LaneBracket { lower, upper, x, nearest, n, multiplier });
+        write(&mut self.batch.answers, group, proven, &LaneBracket { lower, upper, x, nearest, n, multiplier });
         proven
     }
 }

@@ -3,6 +3,7 @@
 use super::error::BatchError;
 use super::lane_poses::pose_of;
 use super::rounds::MOST_ROUNDS;
+use super::shape_pairs::distances_of_axes;
 use super::shapes::{ShapeAnswers, ShapeBatch};
 use crate::body::{Body, Solid};
 use crate::measure::capsule::{Capsule, CapsuleDistance, Problem, distance_to_capsule};
@@ -11,6 +12,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::exact_shape::{ExactProven, Segment};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
+use crate::measure::status::Status;
 use crate::measure::warm::WarmStart;
 use crate::polynomial::dispatch_lanes;
 
@@ -20,10 +22,10 @@ use crate::polynomial::dispatch_lanes;
 /// distances of points.
 ///
 /// Each answer is one of [`distance_to_capsule`] from a cold start in all that is proven of it, and
-/// depends on its own poses only, to the last bit. Bodies of one constraint but balls are solved
-/// several poses at a time, which takes a fraction of the time of as many queries; all others, and
-/// poses that do not converge at once such as those in which the axis meets the body, are solved
-/// one by one.
+/// depends on its own poses only, to the last bit. Bodies of one constraint but balls, and boxes and
+/// cylinders beside capsules with an axis, are solved several poses at a time, which takes a
+/// fraction of the time of as many queries; all others, and poses that do not converge at once such
+/// as those in which the axis meets the body, are solved one by one.
 ///
 /// # Errors
 /// No poses, different numbers of poses, or a number of places that is not the number of poses;
@@ -67,9 +69,7 @@ pub fn distance_to_capsule_batch(
         return Err(BatchError::Lengths { poses: of_solid.max(of_capsule), answers: answers.len() });
     }
     if let [body] = solid.parts()
-        && body.is_smooth()
-        // That of balls is a formula.
-        && body.closed_form().is_none()
+        && is_capsule_solved_in_lanes(solid, capsule)
         && options.max_iterations() >= MOST_ROUNDS
         && runs(Stage::Lanes)
     {
@@ -81,6 +81,16 @@ pub fn distance_to_capsule_batch(
         }
     }
     Ok(())
+}
+
+/// Whether [`distance_to_capsule_batch`] solves several poses at a time: of balls, or of a box or a
+/// cylinder and a point, the distance is a formula.
+pub fn is_capsule_solved_in_lanes(solid: &impl Solid, capsule: &Capsule) -> bool {
+    let [body] = solid.parts() else { return false };
+    match body.closed_form() {
+        Some(form) => !body.is_smooth() && form.axes().is_none() && capsule.half_height_m() > 0.0,
+        None => body.is_smooth(),
+    }
 }
 
 /// The answers of a single body. Not generic, so that it is compiled with this crate, whatever its
@@ -95,8 +105,12 @@ fn in_lanes(
     let form = capsule.closed_form();
     let tolerance = options.accuracy() * capsule.smaller_size_m(of_body.0.circumscribed().radius);
     let answers = OfCapsules { of_body, of_capsule, options, tolerance, answers };
-    let (form, set) = ((&form, of_capsule.1), Segment { half_length: capsule.half_height_m() });
-    dispatch_lanes(ShapeBatch { smooth: of_body, form, set, tolerance, answers });
+    let (axis, half_length) = ((&form, of_capsule.1), capsule.half_height_m());
+    if let Some(shape) = of_body.0.closed_form() {
+        distances_of_axes((shape, of_body.1), (axis, half_length), tolerance, answers);
+    } else {
+        dispatch_lanes(ShapeBatch { smooth: of_body, form: axis, set: Segment { half_length }, tolerance, answers });
+    }
 }
 
 /// Signed distances of a body and a capsule.
@@ -126,8 +140,14 @@ impl ShapeAnswers for OfCapsules<'_> {
     fn write(&mut self, answer: usize, found: &ExactProven) {
         let (capsule, (_, capsule_pose)) = (self.of_capsule.0, self.poses(answer));
         let (tolerance, options, goal) = (self.tolerance, self.options, StopCriterion::NARROW);
-        self.answers[answer] =
+        let answer_of_axis =
             Problem { capsule, capsule_pose, tolerance, options, goal }.outside(&capsule.closed_form(), found);
+        // The radius is subtracted with rounding, for which a single query has more digits.
+        if answer_of_axis.status == Status::Converged {
+            self.answers[answer] = answer_of_axis;
+        } else {
+            self.solve_alone(answer, found.rounds);
+        }
     }
 
     fn solve_alone(&mut self, answer: usize, rounds: u32) {

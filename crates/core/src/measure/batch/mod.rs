@@ -13,6 +13,7 @@ mod error;
 mod iterate;
 mod lane_poses;
 mod rounds;
+mod shape_pairs;
 mod shapes;
 mod waiting;
 
@@ -32,12 +33,13 @@ use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, Simd, Vector, WithSimd, dispatch_lanes};
 use balls::BallBatch;
-pub use capsules::distance_to_capsule_batch;
+pub use capsules::{distance_to_capsule_batch, is_capsule_solved_in_lanes};
 pub use error::BatchError;
 use iterate::Iterate;
 use lane_poses::{lane_rotations, lane_translations};
 use nalgebra::Vector3;
 use rounds::{COARSE, DIVERGED, MOST_COARSE, MOST_ROUNDS, NEARLY_CONVERGED, Rounds, run, solve_alone};
+use shape_pairs::distances;
 use shapes::{OfBodies, ShapeBatch};
 use waiting::{Group, MAX_COARSE, Waiting};
 
@@ -45,10 +47,10 @@ use waiting::{Group, MAX_COARSE, Waiting};
 /// world), written to `answers` in the order of the poses.
 ///
 /// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
-/// its own pose only, to the last bit. Single bodies of one constraint, and such a body beside a
-/// box or a cylinder, are solved several poses at a time, which takes a fraction of the time of as
-/// many queries, of balls by the projection of their centres; all others, and poses that do not
-/// converge at once such as those in contact, are solved one by one.
+/// its own pose only, to the last bit. Single bodies of one constraint, and boxes and cylinders
+/// along the axes of their frames, are solved several poses at a time, which takes a fraction of the
+/// time of as many queries, of balls by the projection of their centres; all others, and poses that
+/// do not converge at once such as those in contact, are solved one by one.
 ///
 /// # Errors
 /// No poses, or a number of places that is not the number of poses; nothing is computed then.
@@ -109,6 +111,8 @@ enum LaneMethod<'a> {
     Smooth,
     /// One has one constraint, the other is such a shape; of two balls the second.
     Beside(&'a ClosedForm, LaneShape),
+    /// Both are boxes or cylinders.
+    Shapes([&'a ClosedForm; 2]),
 }
 
 /// What a body with one constraint is beside.
@@ -122,14 +126,15 @@ enum LaneShape {
 
 impl<'a> LaneMethod<'a> {
     fn of(a: &'a Body, b: &'a Body) -> Option<Self> {
+        let form = |body: &'a Body| body.closed_form().filter(|form| form.axes().is_none());
         let other = match (a.is_smooth(), b.is_smooth()) {
             (true, true) if runs(Stage::ClosedForm) && ball_radius_m(a).is_some() && ball_radius_m(b).is_some() => b,
             (true, true) => return Some(Self::Smooth),
             (true, false) => b,
             (false, true) => a,
-            (false, false) => return None,
+            (false, false) => return Some(Self::Shapes([form(a)?, form(b)?])),
         };
-        let form = other.closed_form().filter(|form| form.axes().is_none())?;
+        let form = form(other)?;
         let shape = match *form.shape() {
             ExactShape::Cuboid { half_extents_m, .. } => LaneShape::Cuboid(Cuboid { half_extents: half_extents_m }),
             ExactShape::Cylinder { radius_m, half_height_m, .. } => {
@@ -158,14 +163,16 @@ fn in_lanes(
     let ((a, pose_a), (b, poses_b)) = (of_a, of_b);
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let standing = std::slice::from_ref(pose_a);
+    let of_bodies = |answers| OfBodies { a: of_a, b: of_b, options, tolerance, answers };
     let (smooth, of_form) = if a.is_smooth() { ((a, standing), poses_b) } else { ((b, poses_b), standing) };
     let (form, shape) = match method {
         LaneMethod::Smooth => {
             return dispatch_lanes(Batch { a, pose_a, b, poses_b, options, tolerance, answers });
         }
         LaneMethod::Beside(form, shape) => ((form, of_form), shape),
+        LaneMethod::Shapes(forms) => return distances(of_bodies(answers), forms),
     };
-    let work = ShapeWork { smooth, form, of_a, of_b, options, tolerance, answers };
+    let work = ShapeWork { smooth, form, answers: of_bodies(answers) };
     match shape {
         LaneShape::Ball(radius) => work.beside(Segment { half_length: 0.0 }, radius),
         LaneShape::Cuboid(set) => work.beside(set, 0.0),
@@ -177,20 +184,15 @@ fn in_lanes(
 struct ShapeWork<'a> {
     smooth: (&'a Body, &'a [Pose]),
     form: (&'a ClosedForm, &'a [Pose]),
-    of_a: (&'a Body, &'a Pose),
-    of_b: (&'a Body, &'a [Pose]),
-    options: &'a Options<'a>,
-    tolerance: f64,
-    answers: &'a mut [Distance],
+    answers: OfBodies<'a>,
 }
 
 impl ShapeWork<'_> {
     /// Beside all that is within a radius (metres) of this set: of a ball by its centre, else, and
     /// without a radius, by Newton's method.
     fn beside(self, set: impl LaneSet, form_radius: f64) {
-        let Self { smooth, form, of_a, of_b, options, tolerance, answers } = self;
-        let answers = OfBodies { a: of_a, b: of_b, options, tolerance, answers };
-        let batch = ShapeBatch { smooth, form, set, tolerance, answers };
+        let Self { smooth, form, answers } = self;
+        let batch = ShapeBatch { smooth, form, set, tolerance: answers.tolerance, answers };
         match (smooth.0.closed_form(), ball_radius_m(smooth.0)) {
             (Some(ball), Some(radius)) if runs(Stage::ClosedForm) => {
                 dispatch_lanes(BallBatch { batch, radius, form_radius, displacement: ball.displacement_m() });

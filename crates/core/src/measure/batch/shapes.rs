@@ -11,10 +11,9 @@ use crate::measure::frames::quaternion::{conjugate_times, rotation_by};
 use crate::measure::frames::vector::{M3, V3, add, apply, apply_transposed, dot, scaled};
 use crate::measure::options::Options;
 use crate::measure::solver::exact_shape::{
-    ExactProven, FLATTEST, LONGEST_STEP, LaneBracket, LaneMove, LaneOffset, LaneSet, WORTH_A_BRACKET_SQUARED, bracket,
-    newton, start,
+    ExactProven, LaneBracket, LaneMove, LaneOffset, LaneSet, WORTH_A_BRACKET_SQUARED, bracket, newton, start,
 };
-use crate::measure::solver::tangent_newton::{Plane, Relative, Side, SurfaceCurvature, moved};
+use crate::measure::solver::tangent_newton::{FLATTEST, LONGEST_STEP, Plane, Relative, Side, SurfaceCurvature, moved};
 use crate::measure::warm::WarmStart;
 use crate::polynomial::{Aligned, Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
 
@@ -134,7 +133,9 @@ impl<P: LaneSet, A: ShapeAnswers> Rounds for ShapeBatch<'_, P, A> {
         let body = self.smooth.0;
         let relative: Relative<N> = self.relative(simd, &group.pose);
         let side = Side::away(simd, body, 0, &relative);
-        let (mut x, mut open) = if fresh { self.begin(simd, body, &relative) } else { resumed(simd, &group) };
+        let one = N::splat(simd, 1.0);
+        let (mut x, mut open) =
+            if fresh { self.begin(simd, body, &relative) } else { (load(simd, &group), one.le(one)) };
         let rounds = if fresh { COARSE } else { 1 };
         let mut square = N::splat(simd, f64::NAN);
         for _ in 0..rounds {
@@ -161,7 +162,7 @@ impl<P: LaneSet, A: ShapeAnswers> Rounds for ShapeBatch<'_, P, A> {
         let body = self.smooth.0;
         let relative: Relative<Lanes<S>> = self.relative(simd, &group.pose);
         let side = Side::away(simd, body, 0, &relative);
-        let (x, _) = resumed(simd, &group);
+        let x = load(simd, &group);
         let here = self.linearize(simd, &side, x);
         let worth = here.square.le(Lanes::<S>::splat(simd, WORTH_A_BRACKET_SQUARED));
         let short = Lanes::<S>::and(simd, here.open, worth);
@@ -173,7 +174,7 @@ impl<P: LaneSet, A: ShapeAnswers> Rounds for ShapeBatch<'_, P, A> {
             let of_body = (body, &relative, &side);
             let (brackets, proven) = bracket(simd, set, of_body, &at, (found, &seen.frame), self.tolerance);
             answered = Lanes::<S>::bits(simd, Lanes::<S>::and(simd, short, proven));
-            self.write(&group, answered, &brackets);
+            write(&mut self.answers, &group, answered, &brackets);
         }
         store(here.advanced(simd, x), &mut group);
         let open = Lanes::<S>::bits(simd, here.open);
@@ -234,45 +235,49 @@ impl<P: LaneSet, A: ShapeAnswers> ShapeBatch<'_, P, A> {
         let center = form.center();
         Relative::from_parts(simd, (center, center.norm()), rotation, translation, body)
     }
+}
 
-    /// Writes the answers of the lanes that are set in `proven`.
-    #[inline(always)]
-    pub(super) fn write<S: Simd>(&mut self, group: &Group<MAX_LANES>, proven: u32, brackets: &LaneBracket<Lanes<S>>) {
-        let LaneBracket { lower, upper, x, nearest, n, multiplier } = *brackets;
-        let mut columns = Aligned([[0.0; MAX_LANES]; 12]);
-        let numbers = [&[lower, upper, multiplier][..], &x, &nearest, &n];
-        for (number, column) in numbers.into_iter().flatten().zip(&mut columns.0) {
-            number.store(column);
-        }
-        for lane in (0..group.count).filter(|lane| proven >> lane & 1 == 1) {
-            let entry = |i: usize| columns.0[i][lane];
-            let vector = |i: usize| [entry(i), entry(i + 1), entry(i + 2)];
-            let found = ExactProven {
-                lower: entry(0),
-                upper: entry(1),
-                x: vector(3),
-                nearest: vector(6),
-                n: vector(9),
-                multiplier: entry(2),
-                rounds: group.rounds[lane] + 1,
-                trace: None,
-            };
-            self.answers.write(group.pose[lane], &found);
-        }
+/// Writes the answers of the lanes that are set in `proven`.
+#[inline(always)]
+pub(super) fn write<S: Simd>(
+    answers: &mut impl ShapeAnswers,
+    group: &Group<MAX_LANES>,
+    proven: u32,
+    brackets: &LaneBracket<Lanes<S>>,
+) {
+    let LaneBracket { lower, upper, x, nearest, n, multiplier } = *brackets;
+    let mut columns = Aligned([[0.0; MAX_LANES]; 12]);
+    let numbers = [&[lower, upper, multiplier][..], &x, &nearest, &n];
+    for (number, column) in numbers.into_iter().flatten().zip(&mut columns.0) {
+        number.store(column);
+    }
+    for lane in (0..group.count).filter(|lane| proven >> lane & 1 == 1) {
+        let entry = |i: usize| columns.0[i][lane];
+        let vector = |i: usize| [entry(i), entry(i + 1), entry(i + 2)];
+        let found = ExactProven {
+            lower: entry(0),
+            upper: entry(1),
+            x: vector(3),
+            nearest: vector(6),
+            n: vector(9),
+            multiplier: entry(2),
+            rounds: group.rounds[lane] + 1,
+            trace: None,
+        };
+        answers.write(group.pose[lane], &found);
     }
 }
 
-/// Points that a group was left with; any lane can go on.
+/// Points that a group was left with.
 #[inline(always)]
-fn resumed<S: Simd, N: Vector<S>, const LANES: usize>(simd: S, group: &Group<LANES>) -> (V3<N>, N::Mask) {
+pub(super) fn load<S: Simd, N: Vector<S>, const LANES: usize>(simd: S, group: &Group<LANES>) -> V3<N> {
     let column = |i: usize| N::load(simd, &group.at.0[i]);
-    let one = N::splat(simd, 1.0);
-    ([column(0), column(1), column(2)], one.le(one))
+    [column(0), column(1), column(2)]
 }
 
 /// Leaves points to a group.
 #[inline(always)]
-fn store<S: Simd, N: Vector<S>, const LANES: usize>(x: V3<N>, group: &mut Group<LANES>) {
+pub(super) fn store<S: Simd, N: Vector<S>, const LANES: usize>(x: V3<N>, group: &mut Group<LANES>) {
     for (coordinate, column) in x.into_iter().zip(&mut group.at.0) {
         coordinate.store(column);
     }

@@ -4,7 +4,7 @@ use super::{BatchError, distance_batch, distance_to_capsule_batch};
 use crate::body::{Body, Compound};
 use crate::measure::solver::stages::{Stage, only};
 use crate::measure::{Capsule, CapsuleDistance, Distance, Options, Pose, Status, WarmStart, distance};
-use nalgebra::{Vector3, Vector4};
+use nalgebra::{UnitQuaternion, Vector3, Vector4};
 use std::sync::atomic::AtomicBool;
 use sublevel_testkit::Seeded;
 
@@ -140,9 +140,13 @@ fn other_solids_are_solved_one_by_one() {
         let single = distance(&compound, &Pose::identity(), &ball, pose_b, &options, &mut WarmStart::default());
         assert_eq!(bits(answer), bits(&single));
     }
-    distance_batch(&cuboid, &Pose::identity(), &cuboid, &poses, &options, &mut answers).unwrap();
+    // With axes of its own.
+    let turn = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, 0.2, -0.5));
+    let turned = cuboid.moved(&turn, &Vector3::zeros()).unwrap();
+    assert!(turned.closed_form().is_some_and(|form| form.axes().is_some()));
+    distance_batch(&cuboid, &Pose::identity(), &turned, &poses, &options, &mut answers).unwrap();
     for (answer, pose_b) in answers.iter().zip(&poses) {
-        let single = distance(&cuboid, &Pose::identity(), &cuboid, pose_b, &options, &mut WarmStart::default());
+        let single = distance(&cuboid, &Pose::identity(), &turned, pose_b, &options, &mut WarmStart::default());
         assert_eq!(bits(answer), bits(&single));
     }
 }

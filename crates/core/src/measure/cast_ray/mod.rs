@@ -22,6 +22,7 @@ use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::status::Status;
 pub use answer::{RayCast, RayHit};
+pub(super) use approach::Approach;
 pub(super) use closed_form::{ShapeEntry, enter};
 use nalgebra::Vector3;
 use normalized_ray::NormalizedRay;
@@ -93,9 +94,9 @@ fn earlier(one: &RayCast, other: &RayCast, tolerance: f64) -> RayCast {
     }
 }
 
-/// Most evaluations along one ray; from outside 1 or 2 are usual, and halving the bracket alone
-/// would need about 50.
-const MAX_STEPS: u32 = 96;
+/// Most evaluations along one ray, or projections along the path of a ball; from outside 1 or 2 are
+/// usual, of balls 3 to 6, and halving the bracket alone would need about 50.
+pub(super) const MAX_STEPS: u32 = 96;
 
 /// The first point of one body on a ray, bracketed within a tolerance in metres.
 fn cast_at(body: &Body, pose: &Pose, ray: &Ray, tolerance: f64, options: &Options<'_>) -> RayCast {

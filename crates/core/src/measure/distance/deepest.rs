@@ -8,8 +8,9 @@
 //! to have a direction.
 
 use crate::measure::frames::query_frame::{Pair, Posed};
-use crate::measure::solver::active_set_qp::{Jets, LONGEST_PROGRAM_STEP, Quadratic};
+use crate::measure::solver::active_set_qp::{Jets, Quadratic};
 use crate::measure::solver::kkt_newton::Active;
+use crate::measure::solver::tangent_newton::LONGEST_STEP;
 use nalgebra::{Matrix3, Vector3, Vector4};
 
 /// Newton iterates of the deepest point, query frame.
@@ -48,7 +49,7 @@ impl Deepest {
         let found = program.step(self.a, self.b, length, &stiffness)?;
         let dx = found.v.xyz();
         let length = length(&dx);
-        let share = (LONGEST_PROGRAM_STEP / length).min(1.0);
+        let share = (LONGEST_STEP / length).min(1.0);
         self.x += dx * share;
         self.s += (found.v.w - self.s) * share;
         (self.a, self.b) = (found.a, found.b);

@@ -13,13 +13,6 @@ use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
-/// Width of the bracket that a decision is tried with first, relative to the circumradius;
-/// dimensionless. One evaluation from the table of support points is about as accurate.
-///
-/// Larger, more decisions take a second search; smaller, all of them take an evaluation more. It
-/// changes time only; no test pins it.
-const ROUGH: f64 = 1e-2;
-
 /// The signed distance, as soon as its bracket is narrow or meets the goal.
 pub(super) fn distance_until(
     (solid, pose): At<'_, impl Solid>,
@@ -84,7 +77,8 @@ impl Ask<'_> {
             if goal.met(proven[0], proven[1]) {
                 return answer(proven, &inner.center, 0);
             }
-            let asked = Asked::within(ROUGH * outer.radius);
+            // One evaluation from the table of support points is about as accurate.
+            let asked = Asked::within(1e-2 * outer.radius);
             let rough = height(body, &above.down, asked, known, options);
             proven = both(proven, above.bracket(&rough));
             if goal.met(proven[0], proven[1]) {

@@ -9,8 +9,7 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
-use crate::measure::solver::barrier_programs::Level;
-use crate::measure::solver::barrier_programs::split;
+use crate::measure::solver::barrier_programs::{Level, split};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::level_continuation::{LevelTrace, Settled};
 use crate::measure::solver::level_newton::LevelNewton;
@@ -21,16 +20,6 @@ use crate::measure::warm::Hint;
 use crate::optimize::{Approach, minimise};
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
-
-/// Most changes of scale; each is by a thousand, and values reach about 1e12 at degree 8.
-const MAX_ROUNDS: u32 = 6;
-
-/// Largest value at a start relative to the least value known, dimensionless; starts above it are
-/// moved inward.
-///
-/// Values grow with the power of the degree: a larger value takes more iterations on the way in, a
-/// smaller one gives up good starts. It changes time only; no test pins it.
-const STEEP_START: f64 = 1e3;
 
 /// How much narrower a bracket has to be, dimensionless, that multipliers are taken from which
 /// Newton's method did not find: they are known to the root of its width.
@@ -178,7 +167,9 @@ impl<'a> Search<'a> {
             self.newton(x, a, b);
         }
         if !self.done() && !self.exhausted() {
-            let (pair, bound) = (self.pair, STEEP_START * self.upper.abs().max(1.0));
+            // Values grow with the power of the degree: starts much above the least known are moved
+            // inward.
+            let (pair, bound) = (self.pair, 1e3 * self.upper.abs().max(1.0));
             let mut inset = 0.1;
             while inset > 1e-12 && !(value(pair, &inner(pair, &self.x, inset)) < bound) {
                 inset *= 0.1;
@@ -201,7 +192,7 @@ impl<'a> Search<'a> {
         );
         let proven = LevelNewton { x: self.proven, a, b };
         for start in [Some(proven), self.ended].into_iter().flatten().filter(|start| start.a.len > 0) {
-            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+            let left = self.options.after(self.iterations).max_iterations();
             let steps = refined.level(&start, left, |found| {
                 if found.lower > self.lower {
                     let (a, b) = &found.active;
@@ -251,7 +242,8 @@ impl<'a> Search<'a> {
             return;
         }
         let pair = self.pair;
-        for _ in 0..MAX_ROUNDS {
+        // Each changes the scale by a thousand, and values reach about 1e12 at degree 8.
+        for _ in 0..6 {
             // Strictly inside, by less each round: the scale must not rise again.
             let start = inner(pair, &self.x, inset);
             inset *= 0.1;

@@ -18,20 +18,14 @@ use crate::measure::half_space::{HalfSpace, distance_to_half_space};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::part_pairs::{NodeBound, TreePair, ball_gaps, nodes, only_node};
-use crate::measure::solver::depth::local_search::solid_tolerance;
+use crate::measure::solver::depth::local_search::{ELSEWHERE, solid_tolerance};
 use crate::measure::solver::min_norm_point::{Bound, Shortest, shortest};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::warm::WarmStart;
 use nalgebra::Vector3;
 
-/// Directions of pairs of parts to start from.
-const STARTS: usize = 8;
-
 /// Starts that are followed to the end: those with the shortest translations.
 const FOLLOWED: usize = 3;
-
-/// Most translations tried from one start.
-const MAX_ROUNDS: u32 = 40;
 
 /// Largest gain that the next rounds together are taken to make, in units of the last one;
 /// dimensionless.
@@ -62,7 +56,7 @@ pub(in crate::measure) struct Start {
 
 /// The starts of the deepest pairs.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::measure) struct Starts([Option<Start>; STARTS]);
+pub(in crate::measure) struct Starts([Option<Start>; 8]);
 
 impl Starts {
     /// Takes a start in the place of a free one or a shallower.
@@ -159,7 +153,7 @@ pub(in crate::measure) fn separate(
     let (length, direction) = (best.norm(), best.normalize());
     let (contacts, crowded) = search.contacts(&best, &direction);
     let from = pose_a.translation();
-    let others = translations.iter().filter(|translation| translation.normalize().dot(&direction) < 0.99);
+    let others = translations.iter().filter(|translation| translation.normalize().dot(&direction) < ELSEWHERE);
     SeparatingTranslation {
         length: length * (1.0 + 8.0 * f64::EPSILON) + 4.0 * f64::EPSILON * search.pose_b.translation().norm(),
         direction,
@@ -283,7 +277,7 @@ impl<'a> Search<'a> {
     /// One at most as long that separates all pairs as well; not worked out if it does not get as
     /// short as `wanted`.
     fn shrink(&mut self, mut translation: Vector3<f64>, wanted: f64) -> Vector3<f64> {
-        for _ in 0..MAX_ROUNDS {
+        for _ in 0..40 {
             let Some(next) = self.beyond_planes(&translation, self.margin).and_then(|(_, found)| found) else { break };
             let mut next = next.v;
             // Pairs whose planes were left out may meet: less far then.

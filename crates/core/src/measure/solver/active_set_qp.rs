@@ -17,14 +17,15 @@ use crate::measure::frames::query_frame::Posed;
 use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
+use crate::measure::solver::tangent_newton::LONGEST_STEP;
 use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 
 /// Variables of a program.
 const VARIABLES: usize = 4;
 
-/// Most changes of the guess.
-const MAX_CHANGES: usize = 8;
+/// Most changes of a guess of what is active, one constraint each.
+pub(in crate::measure) const MAX_CHANGES: usize = 10;
 
 /// Violation of a constraint of a program, relative to its scale and to its right side,
 /// dimensionless, that counts as none.
@@ -51,20 +52,6 @@ pub(in crate::measure) const DAMPINGS: [f64; 6] = [1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
 /// At 1 the rest is singular; lower, steps towards the minimum of a power of degree d are a (d -
 /// 1)-th part of the way. Exercised by `flats_of_different_orders_take_few_iterations`.
 pub(in crate::measure) const MOST_BENT: f64 = 0.9;
-
-/// Longest step of a quadratic program for which its linearizations are valid, relative to the
-/// bodies and to the distance from a centre that values rise from; dimensionless. Twice that of the
-/// tangent plane: the program has all constraints and goes from edge to edge.
-///
-/// Longer steps diverge, shorter ones take more rounds. `active_sets_follow_alone` and
-/// `stages_of_level_distances_solve_alone` count what is solved with it.
-pub(in crate::measure) const LONGEST_PROGRAM_STEP: f64 = 0.5;
-
-/// Length of a step, in the same measure, that is well within that: half of it.
-///
-/// Shorter steps may be lengthened by less damping; of longer ones none is. Exercised with
-/// [`LONGEST_PROGRAM_STEP`].
-pub(in crate::measure) const SHORT_PROGRAM_STEP: f64 = 0.5 * LONGEST_PROGRAM_STEP;
 
 /// Least damping, relative to the first; dimensionless. Rounding tilts faces by about as much.
 ///
@@ -208,7 +195,7 @@ impl Quadratic {
     ) -> Option<Solution> {
         let length = |found: &Option<Solution>| found.as_ref().map_or(f64::INFINITY, |step| length(&step.v.xyz()));
         let mut found = self.solve(a, b);
-        if length(&found) <= LONGEST_PROGRAM_STEP {
+        if length(&found) <= LONGEST_STEP {
             return found;
         }
         let hessian = self.hessian;
@@ -216,13 +203,13 @@ impl Quadratic {
             self.hessian = hessian + stiffness * damping;
             found = self.solve(a, b).or(found);
             let least = length(&found);
-            if least <= LONGEST_PROGRAM_STEP {
-                if i == 0 && least < SHORT_PROGRAM_STEP {
+            if least <= LONGEST_STEP {
+                if i == 0 && least < 0.5 * LONGEST_STEP {
                     // Along what does not bend a step is as long as the damping is little: of faces
                     // nearly parallel only such a step finds the edges.
-                    self.hessian = hessian + stiffness * (damping * (least / SHORT_PROGRAM_STEP).max(LEAST_DAMPING));
+                    self.hessian = hessian + stiffness * (damping * (2.0 * least / LONGEST_STEP).max(LEAST_DAMPING));
                     let longer = self.solve(a, b);
-                    return if length(&longer) <= LONGEST_PROGRAM_STEP { longer } else { found };
+                    return if length(&longer) <= LONGEST_STEP { longer } else { found };
                 }
                 break;
             }

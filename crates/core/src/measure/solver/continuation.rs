@@ -17,7 +17,8 @@ use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::prospect::Prospect;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::tangent_newton::{
-    ALIGNED, Bracket, Plane, Relative, Response, Side, Step, SurfaceCurvature, bracket, moved, newton,
+    ALIGNED, Bracket, FLATTEST, LONGEST_MOVE, NEAR, PATIENCE, Plane, Relative, Response, SETTLED, Side, Step,
+    SurfaceCurvature, bracket, moved, newton,
 };
 use crate::measure::solver::two_point_problem::{Relation, Verdict};
 use crate::polynomial::{Scalar, Simd, WithSimd};
@@ -171,68 +172,15 @@ impl Lost {
     }
 }
 
-/// Most evaluations before another method takes over.
-const MAX_ROUNDS: u32 = 8;
-
-/// Most evaluations from a cold start before another method takes over.
-pub(in crate::measure) const SEEK_ROUNDS: u32 = 16;
-
-/// Evaluations from a cold start after which Newton's method should be near, and any in an overlap
-/// after which a common point should be.
-const PATIENCE: u32 = 6;
-
-/// Evaluations from where the outlines are nearest after which Newton's method should be near: thin
-/// bodies need more of them.
-const PATIENCE_OUTLINED: u32 = 12;
-
-/// Length of a step relative to a body's size, dimensionless, that counts as near: the next is
-/// about its square.
+/// Moves, for the longest ones, beyond which no extrapolation is close enough for a bracket, whose
+/// remainder is of third order: a hundredth of them, relative to the smaller body, too.
 ///
-/// A larger value keeps searches that diverge, a smaller one gives up some that converge.
-/// `continuation_seeks_alone` counts what is solved.
-const NEARLY: f64 = 0.05;
-
-/// Curvature times size, dimensionless, that is added where there is none, so that flat sides have
-/// a system of full rank.
-///
-/// It must vanish beside every curvature that matters (1e-16 of rounding); zero leaves parallel
-/// sides without a step. Exercised by `boxes_meet_face_edge_and_corner`.
-const FLATTEST: f64 = 1e-20;
-
-/// Length of a step relative to the longest one allowed, dimensionless, beyond which no
-/// extrapolation is close enough for a bracket: its remainder is of third order.
-///
-/// A larger value computes brackets that stay wide, a smaller one takes an evaluation more. It
-/// changes time only: `.ci/instructions` pins it.
-const WORTH_A_BRACKET: f64 = 1e-2;
-
-/// Factor by which a step has to narrow the bracket of bodies that touch to be followed by another;
-/// dimensionless.
-///
-/// Larger, steps go on that gain nothing; smaller, contacts are left to double-double arithmetic
-/// too early. It changes time only; no test pins it.
-const NARROWER: f64 = 0.5;
-
-/// Length of a step relative to the longest one allowed, dimensionless, after which only rounding
-/// is left: the next one is about its square.
-///
-/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Exercised by
-/// `impossible_accuracy_is_admitted`.
-const SETTLED: f64 = 1e-9;
-
-/// Moves, for the longest ones, beyond which no bracket is worth its evaluation; that is relative
-/// to the smaller body, too.
+/// Longer, brackets are computed that stay wide; shorter, an evaluation more is taken. It changes
+/// time only: `.ci/instructions` pins it.
 #[inline(always)]
 pub(in crate::measure) fn worth_a_bracket([of_x, of_y]: [f64; 2]) -> [f64; 2] {
-    [WORTH_A_BRACKET * of_x.min(of_y); 2]
+    [1e-2 * of_x.min(of_y); 2]
 }
-
-/// Longest move for which a linearization in the tangent plane is valid, relative to a body's size,
-/// be that in metres or in normalized coordinates; dimensionless.
-///
-/// Longer, Newton's method diverges from cold starts; shorter, it needs more rounds:
-/// `continuation_seeks_alone` counts what it solves within its limit.
-pub(in crate::measure) const LONGEST_MOVE: f64 = 0.25;
 
 /// The longest moves of a point of A and of a point of B, metres.
 #[inline(always)]
@@ -269,7 +217,7 @@ impl<R: Relation> WithSimd for Follow<'_, R> {
             return Err(Lost::after(0));
         }
         let relative = relation.relative(simd, a, b);
-        let most = MAX_ROUNDS.min(options.max_iterations());
+        let most = PATIENCE.min(options.max_iterations());
         let sides = (Side::at_home(simd, a, active[0]), Side::away(simd, b, active[1], &relative));
         let correct = Correct { sides, relation, patience: most, most, options, limits: limits(a, b) };
 
@@ -329,7 +277,8 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
                 (start, [a.outline().active(places[0]) as u8, b.outline().active(places[1]) as u8])
             }
         };
-        let patience = if from.is_some() { PATIENCE_OUTLINED } else { PATIENCE };
+        // From where the outlines are nearest thin bodies take more rounds to come near.
+        let patience = if from.is_some() { most } else { PATIENCE };
         let sides = (Side::at_home(simd, a, active[0].into()), Side::away(simd, b, active[1].into(), &relative));
         let correct = Correct { sides, relation, patience, most, options, limits: limits(a, b) };
         let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
@@ -451,10 +400,10 @@ impl<R: Relation> Correct<'_, R> {
                     }
                     Verdict::Overlap if near => {
                         let common = CommonPoint::between(simd, (side_a, side_b), at.x, at.y);
-                        let deep = -next[2] > NEARLY * self.limits[0].min(self.limits[1]);
-                        // Bodies that touch are left to double-double arithmetic when the bracket
-                        // gets no narrower.
-                        let touching = settled || found.upper > NARROWER * overlap;
+                        let deep = -next[2] > NEAR * self.limits[0].min(self.limits[1]);
+                        // Bodies that touch are left to double-double arithmetic when a step does
+                        // not halve the bracket.
+                        let touching = settled || found.upper > 0.5 * overlap;
                         if common.is_some() || touching || deep && rounds >= PATIENCE {
                             let grazing = (!deep).then(|| at.grazing(simd, &step, &found, trace.active, rounds));
                             return Err(Lost { common, grazing, ..Lost::after(rounds) });
@@ -471,7 +420,7 @@ impl<R: Relation> Correct<'_, R> {
                 length = self.relative_length(simd, &step, local);
             }
             let late = f64::from(1_u32 << rounds.saturating_sub(self.patience));
-            if !near && rounds >= self.patience && !(length * late <= NEARLY) {
+            if !near && rounds >= self.patience && !(length * late <= NEAR) {
                 return Err(Lost::after(rounds));
             }
             // The linearization is not valid farther away.

@@ -21,9 +21,6 @@ use crate::measure::frames::vector::{
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Number, Simd};
 
-/// Turns of the normal by ellipsoids.
-const TURNS: usize = 2;
-
 /// Least distance that the normal is turned for, relative to the widths of the ellipsoids;
 /// dimensionless. Turns are in proportion to width over distance.
 ///
@@ -48,7 +45,8 @@ pub(in crate::measure) fn facing<S: Simd, N: Number<S>>(simd: S, a: &Body, b: &B
     // Where both centres coincide any direction will do.
     let first = N::splat(simd, N::TINY) - relative.origin[0];
     let mut n = normalized(simd, [first, -relative.origin[1], -relative.origin[2]]);
-    for _ in 0..TURNS {
+    // Two turns; `continuation_seeks_alone` counts what is solved from there.
+    for _ in 0..2 {
         let (u, v) = (apply(&shape_a, n), apply(&shape_b, n));
         let (wide_a, wide_b) = (dot(n, u).sqrt(), dot(n, v).sqrt());
         let [of_a, of_b] = N::reciprocals(simd, [wide_a, wide_b]);
@@ -197,9 +195,9 @@ fn turned<S: Simd, N: Number<S>>(simd: S, n: V3<N>, matrix: [N; 6], r: V3<N>, si
 /// About `1 / length³`, as a power of two: multiplied by it nothing is rounded.
 #[inline(always)]
 fn inverse_cube(length: f64) -> f64 {
-    const BIAS: i64 = 1023;
-    let exponent = ((length.to_bits() >> 52) as i64 - BIAS).clamp(-300, 300);
-    f64::from_bits(((BIAS - 3 * exponent) as u64) << 52)
+    let bias = i64::from(f64::MAX_EXP - 1);
+    let exponent = ((length.to_bits() >> 52) as i64 - bias).clamp(-300, 300);
+    f64::from_bits(((bias - 3 * exponent) as u64) << 52)
 }
 
 #[cfg(test)]

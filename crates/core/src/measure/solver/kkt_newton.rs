@@ -15,12 +15,10 @@
 use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
-use crate::measure::solver::active_constraints::ActiveSet;
-use crate::measure::solver::active_constraints::{ActiveConstraints, MAX_ACTIVE};
-use crate::measure::solver::continuation::LONGEST_MOVE;
+use crate::measure::solver::active_constraints::{ActiveConstraints, ActiveSet, MAX_ACTIVE};
 use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::step_acceleration::{Series, Taken, across, along, tangents};
-use crate::measure::solver::tangent_newton::ALIGNED;
+use crate::measure::solver::tangent_newton::{ALIGNED, LONGEST_MOVE, PATIENCE, SEEK_ROUNDS, WORTH_A_BRACKET};
 use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
 
@@ -263,30 +261,6 @@ pub(in crate::measure) const VIOLATED: f64 = 1e-10;
 /// accepted that are off. Exercised by `alignment_turns_normals`.
 const ROUNDED: f64 = 8.0 * f64::EPSILON;
 
-/// Moves of both points relative to their distance, dimensionless, below which they have about
-/// arrived, so that only the normal has to turn.
-///
-/// It changes time only: `active_sets_follow_alone` counts what is solved.
-const ARRIVED: f64 = 0.1;
-
-/// Cosine of the angle between a normal and one that is about where it points: 84 degrees.
-///
-/// It only chooses the start of multipliers, and changes time only; no test pins it.
-const ABOUT: f64 = 0.1;
-
-/// Largest number of Newton steps and of changes of the active set.
-pub(in crate::measure) const MAX_STEPS: u32 = 16;
-
-/// Steps after which they should no longer be cut, whatever was active before.
-const PATIENCE: u32 = 6;
-
-/// Longest Newton step, relative to the bodies, dimensionless, after which a bracket may be narrow:
-/// what remains is about its square.
-///
-/// Larger, brackets are computed that stay wide; smaller, a step more is taken. It changes time
-/// only; no test pins it.
-pub(in crate::measure) const WORTH_A_BRACKET: f64 = 1e-3;
-
 /// Length of a step along which there is no curvature, relative to the bodies and before it is cut,
 /// dimensionless: the regularization is the residual divided by this.
 ///
@@ -304,7 +278,9 @@ pub(in crate::measure) struct StepMonitor {
 
 impl StepMonitor {
     /// Of steps towards a system that none has been taken towards yet.
-    pub(in crate::measure) const START: Self = Self { last: f64::INFINITY, stuck: 0 };
+    pub(in crate::measure) fn new() -> Self {
+        Self { last: f64::INFINITY, stuck: 0 }
+    }
 
     /// Whether the steps, this one of this length the last, are still cut to the longest when they
     /// should no longer be: two in a row, or the first towards a new system. A single long one is
@@ -348,8 +324,9 @@ impl DistanceNewton {
             return 0;
         }
         let mut at = self.evaluate(pair);
-        let (mut monitor, mut series, mut turned) = (StepMonitor::START, Series::default(), false);
-        for step in 1..=MAX_STEPS.min(limit) {
+        let (mut monitor, mut series, mut turned) = (StepMonitor::new(), Series::default(), false);
+        let limit = SEEK_ROUNDS.min(limit);
+        for step in 1..=limit {
             let before = (self.x, self.y);
             let Some(length) = self.step(pair, &at, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its
@@ -358,15 +335,15 @@ impl DistanceNewton {
                 return step;
             };
             let moved = (self.x - before.0).norm() + (self.y - before.1).norm();
-            if !turned && length > LONGEST_MOVE && moved < ARRIVED * (self.x - self.y).norm() {
+            // Where points have about arrived only the normal has to turn.
+            if !turned && length > LONGEST_MOVE && moved < 0.1 * (self.x - self.y).norm() {
                 self.turn(pair);
                 turned = true;
             }
             at = self.evaluate(pair);
             // A long step has not converged: its bracket is not worth its cost, but for flat bodies
             // now and then.
-            let last_step = step == MAX_STEPS.min(limit);
-            if (length < WORTH_A_BRACKET || step % 4 == 0 || last_step) && accept(self) {
+            if (length < WORTH_A_BRACKET || step % 4 == 0 || step == limit) && accept(self) {
                 return step;
             }
             if length < WORTH_A_BRACKET || step % 4 == 0 {
@@ -376,7 +353,7 @@ impl DistanceNewton {
                     | self.a.violated_by(excess, &pair.a, &self.x, 1.0).is_some_and(|i| self.a.push(i))
                     | self.b.violated_by(excess, &pair.b, &self.y, 1.0).is_some_and(|i| self.b.push(i));
                 if changed {
-                    (at, monitor, series, turned) = (self.evaluate(pair), StepMonitor::START, Series::default(), false);
+                    (at, monitor, series, turned) = (self.evaluate(pair), StepMonitor::new(), Series::default(), false);
                     continue;
                 }
             }
@@ -384,7 +361,7 @@ impl DistanceNewton {
                 return step;
             }
         }
-        MAX_STEPS.min(limit)
+        limit
     }
 
     /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so
@@ -401,14 +378,13 @@ impl DistanceNewton {
         turned_a <= ALIGNED && turned_b <= ALIGNED && across + gap_a + gap_b <= enough
     }
 
-    /// Turns the normal along x - y, if that is about where it points: of corners and edges that
-    /// hold both points where they are it is off by long steps still.
+    /// Turns the normal along x - y: of corners and edges that hold both points where they are it
+    /// is off by long steps still.
     fn turn(&mut self, pair: &Pair<'_>) {
         let apart = self.x - self.y;
         let distance = apart.norm().copysign(self.n.dot(&apart));
         let (n, mut a, mut b) = (apart / distance, self.a, self.b);
-        let about = n.dot(&self.n) > ABOUT * self.n.norm();
-        if about && a.fit(&pair.a, &self.x, &-n) && b.fit(&pair.b, &self.y, &n) {
+        if a.fit(&pair.a, &self.x, &-n) && b.fit(&pair.b, &self.y, &n) {
             *self = Self { distance, n, a, b, ..*self };
         }
     }

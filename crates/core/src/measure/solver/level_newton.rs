@@ -11,24 +11,11 @@
 
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::solver::active_constraints::MAX_ACTIVE;
-use crate::measure::solver::active_set_qp::{
-    CENTER, DAMPINGS, Jets, LONGEST_PROGRAM_STEP, MOST_BENT, Quadratic, TO_CENTER,
-};
-use crate::measure::solver::kkt_newton::{Active, At, StepMonitor, WORTH_A_BRACKET};
+use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, Jets, MOST_BENT, Quadratic, TO_CENTER};
+use crate::measure::solver::kkt_newton::{Active, At, StepMonitor};
 use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
-use crate::measure::solver::tangent_newton::ALIGNED;
+use crate::measure::solver::tangent_newton::{ALIGNED, LONGEST_STEP, NEAR, SEEK_ROUNDS, WORTH_A_BRACKET};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
-
-/// Largest number of steps.
-const MAX_STEPS: u32 = 24;
-
-/// Length of a step, relative to the bodies and to the distance from A's interior point,
-/// dimensionless, after which values may still decrease by orders of magnitude, as a power of the
-/// distance.
-///
-/// Larger, Newton's steps are a (d - 1)-th part of the way; smaller, steps for the power go on
-/// where Newton's own converge: `stages_of_level_distances_solve_alone` counts what is solved.
-const POWER_LAW_STEP: f64 = 0.1;
 
 /// Newton iterates of the level-distance system.
 #[derive(Clone, Copy, Debug)]
@@ -60,12 +47,14 @@ impl LevelNewton {
             return Ended { steps: 0, settled: false };
         }
         let mut s = self.start(pair);
-        let (mut monitor, mut last, mut series) = (StepMonitor::START, f64::INFINITY, Series::default());
-        for step in 1..=MAX_STEPS {
+        let (mut monitor, mut last, mut series) = (StepMonitor::new(), f64::INFINITY, Series::default());
+        for step in 1..=SEEK_ROUNDS {
             if stop(step - 1) {
                 return Ended { steps: step - 1, settled: false };
             }
-            let Some(length) = self.step(pair, &mut s, last > POWER_LAW_STEP, &mut series) else {
+            // After a step that is not near values may still decrease by orders of magnitude, as a
+            // power of the distance.
+            let Some(length) = self.step(pair, &mut s, last > 2.0 * NEAR, &mut series) else {
                 // Where both are flat the system is singular, but the point at hand with its
                 // multipliers may do.
                 accept(self);
@@ -79,7 +68,7 @@ impl LevelNewton {
             }
             last = length;
         }
-        Ended { steps: MAX_STEPS, settled: false }
+        Ended { steps: SEEK_ROUNDS, settled: false }
     }
 
     /// Whether the forces of the bodies are opposite, to [`ALIGNED`] or to what rounding leaves of
@@ -137,7 +126,7 @@ impl LevelNewton {
         let free = free.filter(|_| same && self.a.len == 1);
         let force = -of_a.gradient(&self.a);
         let Taken { more, share, length } =
-            series.take(free, &dx, (&force, &hessian), LONGEST_PROGRAM_STEP, |more| length(&(dx + more)));
+            series.take(free, &dx, (&force, &hessian), LONGEST_STEP, |more| length(&(dx + more)));
         self.x += (dx + more) * share;
         *s += (found.v.w * scale - *s) * share;
         (self.a, self.b) = (found.a, found.b.scaled(scale));

@@ -25,9 +25,6 @@ impl Shortest {
     }
 }
 
-/// Most exchanges of one bound for another; a handful is usual, for each makes v longer.
-const MAX_EXCHANGES: usize = 64;
-
 /// The shortest vector within all bounds; none if there is no such vector, or rounding hides it.
 ///
 /// Starting from no bounds, the most violated one joins the active ones, of which at most three
@@ -38,7 +35,8 @@ pub(in crate::measure) fn shortest(bounds: &[Bound]) -> Option<Shortest> {
     let tolerance = 1e-13 * scale;
     let missed = |v: &Vector3<f64>, k: usize| bounds[k].floor - bounds[k].normal.dot(v);
     let mut found = Shortest::default();
-    for _ in 0..MAX_EXCHANGES {
+    // A handful of exchanges of one bound for another is usual, for each makes v longer.
+    for _ in 0..64 {
         let worst = (0..bounds.len()).max_by(|&p, &q| missed(&found.v, p).total_cmp(&missed(&found.v, q)));
         let Some(worst) = worst.filter(|&k| missed(&found.v, k) > tolerance) else { return Some(found) };
         let known = &found.index[..found.len];

@@ -13,10 +13,11 @@
 
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
-use crate::measure::solver::active_set_qp::{Jets, LONGEST_PROGRAM_STEP, Quadratic};
+use crate::measure::solver::active_set_qp::{Jets, Quadratic};
 use crate::measure::solver::barrier_programs::near_boundary;
-use crate::measure::solver::kkt_newton::{Active, MAX_STEPS, StepMonitor, WORTH_A_BRACKET};
+use crate::measure::solver::kkt_newton::{Active, StepMonitor};
 use crate::measure::solver::step_acceleration::{Series, Taken, tangents};
+use crate::measure::solver::tangent_newton::{LONGEST_MOVE, LONGEST_STEP, SEEK_ROUNDS, WORTH_A_BRACKET};
 use crate::optimize::{Program, Row, Rows};
 use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3, Vector4};
 
@@ -119,13 +120,6 @@ pub(in crate::measure) struct ReachNewton {
     length: f64,
 }
 
-/// Length of a step relative to the bodies, dimensionless, after which Newton's method for the
-/// distance converges from where the ray's has led.
-///
-/// Larger, its iterations are in vain; smaller, it is not tried:
-/// `support_tables_start_quadratic_programs` counts what is solved.
-const HANDOVER_STEP: f64 = 0.15;
-
 impl ReachNewton {
     /// The first iterate; none if the start is of no use for u.
     pub(in crate::measure) fn new(pair: &Pair<'_>, start: RayStart) -> Option<Self> {
@@ -151,8 +145,8 @@ impl ReachNewton {
         before: u32,
         mut accept: impl FnMut(&Self) -> bool,
     ) -> u32 {
-        let (mut monitor, mut series) = (StepMonitor::START, Series::default());
-        for step in 1..=MAX_STEPS {
+        let (mut monitor, mut series) = (StepMonitor::new(), Series::default());
+        for step in 1..=SEEK_ROUNDS {
             if options.exhausted(before + step - 1) {
                 return step - 1;
             }
@@ -168,16 +162,17 @@ impl ReachNewton {
             if (length < WORTH_A_BRACKET || step % 4 == 0) && accept(self) {
                 return step;
             }
-            if monitor.has_diverged(step, length, LONGEST_PROGRAM_STEP) || monitor.ends_with(length) {
+            if monitor.has_diverged(step, length, LONGEST_STEP) || monitor.ends_with(length) {
                 return step;
             }
         }
-        MAX_STEPS
+        SEEK_ROUNDS
     }
 
-    /// Whether the last step shows that the solution is near.
+    /// Whether the last step is no longer than those of Newton's method for the distance, which
+    /// then goes on from here.
     pub(in crate::measure) fn is_near(&self) -> bool {
-        self.length < HANDOVER_STEP
+        self.length < LONGEST_MOVE
     }
 
     /// One Newton step; its length relative to the bodies, or none if it leads nowhere.
@@ -200,7 +195,7 @@ impl ReachNewton {
         let free = tangents(&of_a.gradients(&self.a)[..self.a.len], &of_b.gradients(&self.b)[..self.b.len]);
         let residual = -(of_a.gradient(&self.a) + of_b.gradient(&self.b));
         let Taken { more, share, length } =
-            series.take(free.filter(|_| same), &dx, (&residual, &(bent_a + bent_b)), LONGEST_PROGRAM_STEP, |more| {
+            series.take(free.filter(|_| same), &dx, (&residual, &(bent_a + bent_b)), LONGEST_STEP, |more| {
                 pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
             });
         let (dx, dy) = ((dx + more) * share, (dy + more) * share);

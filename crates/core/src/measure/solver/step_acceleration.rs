@@ -12,7 +12,7 @@
 //! law of the slopes leads back.
 
 use crate::measure::frames::vector::{V3, add_scaled, basis, scaled};
-use crate::measure::solver::tangent_newton::Symmetric2;
+use crate::measure::solver::tangent_newton::{NEAR, Symmetric2};
 use crate::polynomial::{MAX_DEGREE, Scalar, Simd};
 use nalgebra::{Matrix3, Vector3};
 
@@ -23,13 +23,6 @@ use nalgebra::{Matrix3, Vector3};
 /// are not recognised; smaller, steps of plain roots are lengthened. Exercised by
 /// `steps_that_converge_fast_are_newtons`.
 const FAST: f64 = 0.55;
-
-/// Length of a step relative to the bodies, dimensionless, beyond which steps are not of a series:
-/// surfaces are a power of the way near the solution only.
-///
-/// Larger, steps far away are lengthened by chance; smaller, flat sides take more steps. Pinned by
-/// `steps_that_converge_fast_are_newtons`.
-const SERIES_STEP: f64 = 0.05;
 
 /// Change of the step along the way, relative to that, dimensionless, of slopes that vanish with a
 /// power: 1/m of a root of multiplicity m, from 7 at most to 2 at least, with room for rounding.
@@ -43,12 +36,6 @@ const SLOW: std::ops::Range<f64> = 0.06..0.6;
 /// Larger, steps are lengthened that are of no power; smaller, powers with a rest of higher order
 /// are missed. Exercised by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const TOLERATED: f64 = 0.05;
-
-/// Highest power of slopes: degree 8 has slopes of power 7.
-///
-/// Larger, steps may lead past the root; smaller, the flattest sides take more steps. Exercised by
-/// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
-const HIGHEST_POWER: f64 = (MAX_DEGREE - 1) as f64;
 
 /// Length of a step relative to Newton's step before it, dimensionless, from which one leads to
 /// where surfaces are flat.
@@ -64,31 +51,20 @@ const LEAP: f64 = 1.5;
 /// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const WILD: f64 = 0.3;
 
-/// Length of a step relative to the corrected step before it, dimensionless, beyond which it is
-/// cut.
-///
-/// Larger, a wrong correction is followed by another; smaller, series are cut that converge.
-/// Exercised by `flat_sides_take_few_steps_however_flat_and_however_tilted`.
-const FARTHER: f64 = 2.0;
-
 /// Cosine of the angle to the last step below which a step leads back: 154 degrees.
 ///
 /// Nearer to -1, oscillations that drift are not cut; nearer to 0, turns are. Exercised by
 /// `oscillating_steps_meet_between`.
 const BACK: f64 = -0.9;
 
-/// Length of a step that leads back, relative to the last step, dimensionless, of an oscillation.
+/// Length of a step relative to the last step, dimensionless, that is about the same: of one that
+/// leads back it is that of an oscillation, and longer ones are cut after a corrected one.
 ///
-/// Outside of it the steps converge or diverge by themselves. Exercised by
-/// `oscillating_steps_meet_between`.
+/// Wider, a wrong correction is followed by another, and steps are cut that converge or diverge by
+/// themselves; narrower, series are cut that converge. Exercised by
+/// `oscillating_steps_meet_between` and
+/// `flat_sides_take_few_steps_however_flat_and_however_tilted`.
 const AS_FAR: std::ops::Range<f64> = 0.5..2.0;
-
-/// Length of steps relative to the bodies, dimensionless, beyond which they may oscillate: twice
-/// that of a series.
-///
-/// Smaller, steps that converge are cut; larger, oscillations are found late. Pinned by
-/// `oscillating_steps_meet_between`.
-const RETURNING_STEP: f64 = 0.1;
 
 /// A vector along the tangents.
 type V2 = [f64; 2];
@@ -128,7 +104,7 @@ impl Series {
     #[inline(always)]
     pub(in crate::measure) fn may_have_to_be_corrected(&self, newton: V2, length: f64) -> bool {
         let last = dot(self.last.newton, self.last.newton);
-        last > 0.0 && (self.last.corrected || length < SERIES_STEP && self.is_slow(newton))
+        last > 0.0 && (self.last.corrected || length < NEAR && self.is_slow(newton))
     }
 
     /// Whether the last step has been corrected.
@@ -169,7 +145,7 @@ impl Series {
     /// [`part`].
     #[inline(always)]
     pub(in crate::measure) fn part<S: Simd>(&self, simd: S, tangents: [V3<f64>; 2], step: V2, length: f64) -> f64 {
-        if length > RETURNING_STEP && !self.last.corrected {
+        if length > 2.0 * NEAR && !self.last.corrected {
             part(across(simd, self.tangents, self.last.taken), across(simd, tangents, step))
         } else {
             1.0
@@ -198,7 +174,7 @@ impl Series {
         };
         let taken = length(&more);
         let step: V3<f64> = (step + more).into();
-        let part = if taken > RETURNING_STEP && !was_corrected { part(way, step) } else { 1.0 };
+        let part = if taken > 2.0 * NEAR && !was_corrected { part(way, step) } else { 1.0 };
         if taken > longest || part < 1.0 {
             *self = Self::default();
         }
@@ -292,7 +268,7 @@ pub(in crate::measure) struct Correction {
 #[cold]
 pub(in crate::measure) fn correction(newton: V2, slope: V2, compliance: Symmetric2<f64>, last: &Last) -> Correction {
     // Where both surfaces are flat the one direction says how far to go in the other.
-    let most = if last.corrected { FARTHER * dot(last.taken, last.taken).sqrt() } else { f64::INFINITY };
+    let most = if last.corrected { AS_FAR.end * dot(last.taken, last.taken).sqrt() } else { f64::INFINITY };
     let mut correction = Correction::default();
     for direction in principal(compliance) {
         let [step, last_step, way] = [newton, last.newton, last.taken].map(|v| dot(v, direction));
@@ -300,7 +276,8 @@ pub(in crate::measure) fn correction(newton: V2, slope: V2, compliance: Symmetri
         let fall = (dot(slope, direction) / dot(last.slope, direction)).abs();
         let power = way / last_step;
         let length = if SLOW.contains(&change) && is_power(fall, step / last_step, 1.0 / change) {
-            step * (1.0 / change).min(HIGHEST_POWER)
+            // A polynomial of degree d has slopes of power d - 1 at most.
+            step * (1.0 / change).min((MAX_DEGREE - 1) as f64)
         } else if power > LEAP && fall > 0.0 && step.abs() > WILD * way.abs() {
             (way * (1.0 + 1.0 / fall).powf(-1.0 / power)).copysign(step)
         } else if step.abs() > most {

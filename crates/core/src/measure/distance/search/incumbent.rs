@@ -61,7 +61,7 @@ impl Search<'_> {
         }
         let distance = n.dot(&(x - y)).max(0.0);
         let mut newton = DistanceNewton { x, y, distance, n, a, b };
-        let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
+        let left = self.options.after(self.iterations).max_iterations();
         let steps = newton.run(self.pair, left, |at| {
             // Stationary in an overlap.
             if at.distance <= 0.0 {

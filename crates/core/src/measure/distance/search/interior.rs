@@ -4,22 +4,12 @@ use super::Search;
 use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::distance::deepest::Deepest;
 use crate::measure::solver::barrier_programs::{Closest, Level, points, split};
-use crate::measure::solver::kkt_newton::{Active, StepMonitor, WORTH_A_BRACKET};
+use crate::measure::solver::kkt_newton::{Active, StepMonitor};
 use crate::measure::solver::stages::{Stage, runs};
+use crate::measure::solver::tangent_newton::{SEEK_ROUNDS, WORTH_A_BRACKET};
 use crate::optimize::minimise;
 use nalgebra::{SVector, Vector3};
 use std::ops::ControlFlow;
-
-/// Most steps towards the point deepest in both bodies.
-const MAX_DEEPEST: u32 = 10;
-
-/// Largest value of a constraint, dimensionless, that the search for the deepest point starts from;
-/// beyond it a witness is the start.
-///
-/// Values grow with the power of the degree: a larger one takes more iterations from far starts, a
-/// smaller one starts at the witnesses where the middle is better. It changes time only; no test
-/// pins it.
-const STEEP: f64 = 1e3;
 
 impl Search<'_> {
     /// Interior-point method on ½|x - y|², with Newton's method tried as soon as it shows the
@@ -86,8 +76,8 @@ impl Search<'_> {
         let pair = self.pair;
         let (a, b) = (Active::near(&pair.a, v, &-n), Active::near(&pair.b, v, n));
         let mut deepest = Deepest::new(*v, self.depth(v), a, b);
-        let mut monitor = StepMonitor::START;
-        for _ in 0..MAX_DEEPEST {
+        let mut monitor = StepMonitor::new();
+        for _ in 0..SEEK_ROUNDS {
             if self.options.exhausted(self.iterations) {
                 return;
             }
@@ -134,12 +124,10 @@ impl Search<'_> {
             return;
         }
         let pair = self.pair;
-        // Far outside a small body its values would hide all else.
-        let starts = [(self.x + self.y) * 0.5, self.x, self.y];
-        let middling = self.depth(&starts[0]) < STEEP;
-        let start = if middling { starts[0] } else { least_of(starts, |v| self.depth(v)) };
-        let first = self.depth(&start) + 0.5;
-        let mut v = SVector::from([start.x, start.y, start.z, first]);
+        // Far outside a small body its values would hide all else, and a witness is a better start.
+        let starts = [(self.x + self.y) * 0.5, self.x, self.y].map(|v| (self.depth(&v), v));
+        let (least, start) = starts.into_iter().min_by(|p, q| p.0.total_cmp(&q.0)).unwrap_or(starts[0]);
+        let mut v = SVector::from([start.x, start.y, start.z, least + 0.5]);
         let mut attempt = 1e-1;
         let program = Level { pair, both: true, scale: 1.0 };
         minimise(&program, &mut v, 1.0, |iterate| {
@@ -157,9 +145,4 @@ impl Search<'_> {
             if ended { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         });
     }
-}
-
-/// Of three points the one of the least value.
-fn least_of(points: [Vector3<f64>; 3], value: impl Fn(&Vector3<f64>) -> f64) -> Vector3<f64> {
-    points.into_iter().min_by(|p, q| value(p).total_cmp(&value(q))).unwrap_or(points[0])
 }

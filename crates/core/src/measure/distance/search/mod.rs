@@ -12,7 +12,7 @@ use crate::measure::bounds::duality_bounds::{DualTrial, distance_lower};
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
-use crate::measure::solver::continuation::{Lost, SEEK_ROUNDS, Seek, Trace};
+use crate::measure::solver::continuation::{Lost, Seek, Trace};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::kkt_newton::{Active, DistanceNewton};
 use crate::measure::solver::ray_program::{RayStart, ReachNewton};
@@ -20,6 +20,7 @@ use crate::measure::solver::refinement::RefinedPair;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::support_table_gjk::approach;
+use crate::measure::solver::tangent_newton::{PATIENCE, SEEK_ROUNDS};
 use crate::measure::solver::two_point_problem::Apart;
 use crate::measure::warm::Hint;
 use crate::optimize::Approach;
@@ -70,23 +71,12 @@ pub(in crate::measure::distance) struct Search<'a> {
 /// method then.
 const SHORT_DISTANCE: f64 = 1e-3;
 
-/// Distance of the nearest points of the support tables, relative to the larger body,
-/// dimensionless, above which no common point is searched for.
-///
-/// Support tables are off by a few percent of a body. A larger value searches in vain, a smaller
-/// one leaves overlaps to slower methods. It changes time only; no test pins it.
-const FACING: f64 = 0.1;
-
 /// Distance relative to the larger body, dimensionless, below which rounding determines the
 /// gradient of `½ |x - y|²`, and refinement takes over from the interior-point method.
 ///
 /// A larger value refines what doubles can solve, a smaller one iterates on rounding. It changes
 /// time only; no test pins it.
 const SHORTEST_DISTANCE: f64 = 1e-7;
-
-/// Steps in double-double arithmetic for which side of contact a narrow bracket is on: those that
-/// find out take half as many.
-const UNSURE: u32 = 8;
 
 /// Share of the way to an interior point, dimensionless, that moves a point off a surface into the
 /// body.
@@ -195,7 +185,8 @@ impl<'a> Search<'a> {
                 }
             }
         }
-        let near = found.common.is_some() || (x - y).norm() < FACING * pair.size();
+        // Support tables are off by a few percent of a body.
+        let near = found.common.is_some() || (x - y).norm() < 0.1 * pair.size();
         if !self.ended() && self.lower == 0.0 && near {
             self.deepest(&found.common.unwrap_or((x + y) * 0.5), &n);
         }
@@ -396,8 +387,9 @@ impl<'a> Search<'a> {
         let refined = RefinedPair::new(pair);
         // Once each: from the same start it would end the same.
         while let Some(start) = self.tried.iter_mut().find_map(Option::take) {
-            let left = self.options.max_iterations() - self.iterations.min(self.options.max_iterations());
-            let left = if self.narrow() && self.goals.0.is_narrow() { left.min(UNSURE) } else { left };
+            let left = self.options.after(self.iterations).max_iterations();
+            // Those that find out on which side of contact a narrow bracket is take half of that.
+            let left = if self.narrow() && self.goals.0.is_narrow() { left.min(PATIENCE) } else { left };
             let steps = refined.distance(&start, left, |found| {
                 if self.raise(found.lower, &found.n) {
                     self.active = found.active;

@@ -6,10 +6,11 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveSet;
-use crate::measure::solver::continuation::{Follow, Proven, SEEK_ROUNDS, Seek, Trace};
+use crate::measure::solver::continuation::{Follow, Proven, Seek, Trace};
 use crate::measure::solver::kkt_newton::{AT, Active, DistanceNewton};
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::support_point::{SupportPoint, support_of_a, support_of_b};
+use crate::measure::solver::tangent_newton::SEEK_ROUNDS;
 use crate::measure::solver::two_point_problem::Through;
 use crate::measure::warm::{Hint, WarmStart};
 use crate::polynomial::dispatch;
@@ -61,18 +62,13 @@ fn surrounding(
 }
 
 /// First step of the search around a direction, as the tangent of its angle; dimensionless.
-/// Newton's method ends within about its square of an optimum on one side.
+/// Newton's method ends within about its square of an optimum on one side. Its square is the last
+/// step: depths are then stationary to the square of that, which is rounding.
 ///
-/// A larger value takes more rounds, a smaller one does not cross the edges that stopped Newton's
-/// method. Exercised by `searches_end_at_the_best_direction_alone`.
-const FIRST_STEP: f64 = 1e-4;
-
-/// Last step of that search, as the tangent of its angle: depths are then stationary to its square,
-/// which is rounding.
-///
-/// A larger value ends before the best direction, a smaller one compares rounding. Exercised by
+/// A larger value takes more rounds and ends farther from the best direction, a smaller one does
+/// not cross the edges that stopped Newton's method. Exercised by
 /// `searches_end_at_the_best_direction_alone`.
-const LAST_STEP: f64 = 1e-8;
+const FIRST_STEP: f64 = 1e-4;
 
 /// By how much more depth a direction may show that is taken as the better one of two because it is
 /// aligned, relative to the accuracy asked for; dimensionless.
@@ -80,9 +76,6 @@ const LAST_STEP: f64 = 1e-8;
 /// A larger value returns a depth that is less tight, a smaller one prefers directions whose
 /// normals are not those of the surfaces. Exercised by `one_normal_and_one_slope_through_contact`.
 const ROUGHLY: f64 = 0.01;
-
-/// Most rounds of that search.
-const MOST_ROUNDS: u32 = 24;
 
 /// Width of a bracket asked for, in query units; finite even where no depth is known, so that an
 /// infinite bracket is never narrow.
@@ -235,8 +228,9 @@ impl<'a> Best<'a> {
         let pair = self.pair;
         let enough = 0.1 * pair.tolerance(self.options.accuracy());
         let mut step = FIRST_STEP;
-        for round in 0..MOST_ROUNDS {
-            let Some(n) = self.n.filter(|_| step > LAST_STEP && !self.options.exhausted(self.iterations)) else {
+        for round in 0..SEEK_ROUNDS {
+            let Some(n) = self.n.filter(|_| step > FIRST_STEP * FIRST_STEP && !self.options.exhausted(self.iterations))
+            else {
                 return;
             };
             self.iterations += 1;
@@ -245,7 +239,7 @@ impl<'a> Best<'a> {
             let first = n.cross(&basis).normalize();
             let (sin, cos) = angle.sin_cos();
             let needle = first * cos + n.cross(&first) * sin;
-            let mut around = [(f64::INFINITY, n, SupportPoint::NONE, SupportPoint::NONE); 4];
+            let mut around = [(f64::INFINITY, n, SupportPoint::default(), SupportPoint::default()); 4];
             for (found, tangent) in around.iter_mut().zip([needle, -needle, n.cross(&needle), -n.cross(&needle)]) {
                 let turned = (n + tangent * step).normalize();
                 let a = support_of_a(pair, &-turned, enough, None);

@@ -22,7 +22,7 @@ use crate::measure::solver::support_point::SupportPoint;
 use nalgebra::{Matrix3, Vector3};
 
 /// A direction with the support points of A along -n and of B along n.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Direction {
     pub(super) n: Vector3<f64>,
     pub(super) a: SupportPoint,
@@ -44,7 +44,7 @@ impl Direction {
 }
 
 /// A triangle of directions that is not proven to be good enough.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cell {
     pub(super) corners: [u16; 3],
     /// At most about this is the bound.
@@ -65,9 +65,7 @@ pub(super) struct Covering<const N: usize> {
 impl<const N: usize> Covering<N> {
     #[inline(always)]
     pub(super) fn new() -> Self {
-        let point = SupportPoint { x: Vector3::zeros(), active: 0 };
-        let blank = Direction { n: Vector3::zeros(), a: point, b: point, parents: [0, 0] };
-        let cell = Cell { corners: [0; 3], guess: 0.0 };
+        let (blank, cell) = (Direction::default(), Cell::default());
         Self { directions: [blank; N], len: 0, cells: [[cell; N]; 2], open: 0, middles: [[0; N]; 2] }
     }
 
@@ -332,9 +330,8 @@ mod tests {
     fn cells_come_out_lowest_first_and_middles_are_found_again() {
         let mut covering = Covering::<64>::new();
         let mut random = Seeded(3);
-        let point = SupportPoint { x: Vector3::zeros(), active: 0 };
         for _ in 0..4 {
-            covering.add(Direction { n: Vector3::x(), a: point, b: point, parents: [0, 0] });
+            covering.add(Direction::default());
         }
         for i in 0..100 {
             covering.push(Cell { corners: [i, 0, 0], guess: random.signed() });
@@ -350,7 +347,7 @@ mod tests {
         for i in 0..4 {
             for j in i + 1..4 {
                 assert_eq!(covering.middle(j, i), None);
-                let index = covering.add_middle(Direction { n: Vector3::y(), a: point, b: point, parents: [i, j] });
+                let index = covering.add_middle(Direction { parents: [i, j], ..Direction::default() });
                 assert_eq!((covering.middle(i, j), covering.middle(j, i)), (Some(index), Some(index)));
             }
         }

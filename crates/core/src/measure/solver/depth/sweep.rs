@@ -29,11 +29,6 @@ pub(in crate::measure) struct Proof {
     pub(in crate::measure) directions: u32,
 }
 
-/// Tables of directions: one that costs little to lay out and serves nearly all pairs, and one for
-/// ties.
-const FEW: usize = 128;
-const MANY: usize = 2048;
-
 /// Bounds the depth from below, improving the best direction on the way.
 pub(in crate::measure) fn prove(best: &mut Best<'_>) -> Proof {
     if runs(Stage::DirectionSampling) {
@@ -42,21 +37,16 @@ pub(in crate::measure) fn prove(best: &mut Best<'_>) -> Proof {
             best.seek(Some(&n));
         }
     }
-    match sweep::<FEW>(best) {
+    // With a table of directions that costs little to lay out and serves nearly all pairs, then
+    // with one for ties.
+    match sweep::<128>(best) {
         (proof, true) if !best.options.exhausted(best.iterations) => {
-            let (more, _) = sweep::<MANY>(best);
+            let (more, _) = sweep::<2048>(best);
             Proof { lower: more.lower.max(proof.lower), directions: more.directions + proof.directions, ..more }
         }
         (proof, _) => proof,
     }
 }
-
-/// Triangles that are split together, as their support points are found together; the same on every
-/// machine.
-const GROUP: usize = MAX_LANES;
-
-/// Groups split in one iteration.
-const GROUPS: u32 = 8;
 
 /// Sweeps the sphere of directions until the bracket is narrow; also says whether the table was
 /// full first.
@@ -133,11 +123,12 @@ impl<const N: usize> Sweep<'_, N> {
         }
         loop {
             let before = self.covering.directions().len();
-            for _ in 0..GROUPS {
+            // Eight groups are one iteration.
+            for _ in 0..8 {
                 if best.depth <= 0.0 || self.covering.is_closed() {
                     return Some(());
                 }
-                if !self.covering.has_room(GROUP) {
+                if !self.covering.has_room(MAX_LANES) {
                     return None;
                 }
                 if !self.split(best) {
@@ -175,22 +166,22 @@ impl<const N: usize> Sweep<'_, N> {
     }
 
     /// Support points along each n and against it; none if one of them cannot be found.
-    fn directions(&mut self, wanted: &[Wanted], best: &Best<'_>) -> Option<[Option<Direction>; GROUP]> {
+    fn directions(&mut self, wanted: &[Wanted], best: &Best<'_>) -> Option<[Option<Direction>; MAX_LANES]> {
         let pair = self.pair;
-        let mut sought = [[Sought::default(); GROUP]; 2];
-        let mut tolerated = [0.0; GROUP];
+        let mut sought = [[Sought::default(); MAX_LANES]; 2];
+        let mut tolerated = [0.0; MAX_LANES];
         for (k, want) in wanted.iter().enumerate() {
             tolerated[k] = self.tolerated(want, best);
             let tolerance = tolerated[k] * pair.unit();
             sought[0][k] = Sought { n: -want.n, tolerance };
             sought[1][k] = Sought { n: pair.direction_to_b(&want.n), tolerance };
         }
-        let (mut of_a, mut of_b) = ([None; GROUP], [None; GROUP]);
+        let (mut of_a, mut of_b) = ([None; MAX_LANES], [None; MAX_LANES]);
         if runs(Stage::SupportLanes) {
             of_a = dispatch(Farthest { body: pair.a.body, sought: &sought[0][..wanted.len()] });
             of_b = dispatch(Farthest { body: pair.b.body, sought: &sought[1][..wanted.len()] });
         }
-        let mut found = [None; GROUP];
+        let mut found = [None; MAX_LANES];
         for (k, want) in wanted.iter().enumerate() {
             found[k] = Some(self.direction(want, tolerated[k], [of_a[k], of_b[k]])?);
         }
@@ -276,12 +267,13 @@ impl<const N: usize> Sweep<'_, N> {
         });
     }
 
-    /// Splits the lowest triangles; false if that cannot be done, all staying as it is.
+    /// Splits the lowest triangles, as many as their support points are found together, the same on
+    /// every machine; false if that cannot be done, all staying as it is.
     fn split(&mut self, best: &Best<'_>) -> bool {
         // Each with the middle of its widest edge if that is known, else where it is wanted.
-        let (mut cells, mut count) = ([None; GROUP], 0);
-        let (mut wanted, mut missing) = ([Wanted { n: Vector3::zeros(), between: None }; GROUP], 0);
-        while count < GROUP
+        let (mut cells, mut count) = ([None; MAX_LANES], 0);
+        let (mut wanted, mut missing) = ([Wanted { n: Vector3::zeros(), between: None }; MAX_LANES], 0);
+        while count < MAX_LANES
             && let Some(cell) = self.covering.pop()
         {
             let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
@@ -299,7 +291,7 @@ impl<const N: usize> Sweep<'_, N> {
             cells[count] = Some((cell, [i, j, k], middle));
             count += 1;
         }
-        let found = if missing > 0 { self.directions(&wanted[..missing], best) } else { Some([None; GROUP]) };
+        let found = if missing > 0 { self.directions(&wanted[..missing], best) } else { Some([None; MAX_LANES]) };
         let Some(found) = found else {
             cells.into_iter().flatten().for_each(|(cell, ..)| self.covering.push(cell));
             return false;

@@ -1,9 +1,8 @@
 //! Several constraints of a body at a point, and a weighted sum of those that are active.
 
-use super::quadratic_program::MOST_ACTIVE;
 use crate::body::{Body, ConstraintTrust, MAX_CONSTRAINTS};
-use crate::measure::frames::vector::{V3, add_scaled, dot};
-use crate::measure::solver::active_constraints::{ActiveConstraints, ActiveSet};
+use crate::measure::frames::vector::{M3, V3, add_scaled, apply, dot};
+use crate::measure::solver::active_constraints::{ActiveConstraints, ActiveSet, MAX_ACTIVE};
 use crate::measure::solver::tangent_newton::Side;
 use crate::polynomial::{NEAR_LEVEL, NumberJet, Simd, ThirdCeiling};
 
@@ -50,17 +49,37 @@ impl Evaluated {
     pub(super) fn highest(&self) -> usize {
         (0..self.count).max_by(|&i, &j| self.jets[i].value.total_cmp(&self.jets[j].value)).unwrap_or(0)
     }
+
+    /// The point, to which a step has led too far, brought near the body by that constraint; none
+    /// if it is no place.
+    #[inline(always)]
+    pub(super) fn brought_near<S: Simd>(&self, simd: S, side: &Side<'_, f64>, v: V3<f64>) -> Option<V3<f64>> {
+        let highest = self.highest();
+        let v = side.with_active(highest).brought_near(simd, v, self.jets[highest].value);
+        v.iter().all(|entry| entry.is_finite()).then_some(v)
+    }
 }
 
 /// Constraints with their weights; those beyond are 0.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Weighted {
-    pub(super) index: [u8; MOST_ACTIVE],
-    pub(super) weight: [f64; MOST_ACTIVE],
+    pub(super) index: [u8; MAX_ACTIVE],
+    pub(super) weight: [f64; MAX_ACTIVE],
     pub(super) len: usize,
 }
 
 impl Weighted {
+    /// The constraint with the largest value alone, weighted so that its gradient has length 1 in
+    /// the basis whose vectors are `local` in normalized coordinates.
+    #[inline(always)]
+    pub(super) fn highest<S: Simd>(_: S, all: &Evaluated, local: &M3<f64>) -> Self {
+        let (mut active, highest) = (Self { len: 1, ..Self::default() }, all.highest());
+        let gradient = apply::<S, f64>(local, all.jets[highest].gradient);
+        active.index[0] = highest as u8;
+        active.weight[0] = 1.0 / dot::<S, f64>(gradient, gradient).sqrt();
+        active
+    }
+
     #[inline(always)]
     pub(super) fn iter(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         (0..self.len).map(|k| (usize::from(self.index[k]), self.weight[k]))

@@ -12,35 +12,19 @@ use crate::measure::frames::vector::{
 };
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
+use crate::measure::solver::active_set_qp::MAX_CHANGES;
 use crate::measure::solver::common_point::CommonPoint;
-use crate::measure::solver::continuation::{LONGEST_MOVE, Lost, limits, worth_a_bracket};
+use crate::measure::solver::continuation::{Lost, limits, worth_a_bracket};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::prospect::Prospect;
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{Bracket, Plane, Relative, Side, Step, TAYLOR_ROUNDING, bracket, moved};
+use crate::measure::solver::tangent_newton::{
+    Bracket, LONGEST_MOVE, Relative, SEEK_ROUNDS, Side, Step, TAYLOR_ROUNDING, bracket, moved,
+};
 use crate::measure::solver::two_point_problem::{Apart, Relation, Verdict};
 use crate::polynomial::{Simd, WithSimd};
 use nalgebra::Vector3;
-
-/// Most evaluations of both bodies from one start. It changes time only; no test pins it.
-const MAX_ROUNDS: u32 = 16;
-
-/// Short steps to points that have passed each other after which the bodies seem to overlap. It
-/// changes time only: their deepest point is found by the general search.
-const MOST_CONTACTS: u32 = 3;
-
-/// Length of a step whose end is proven, relative to those of smooth bodies: with the weights of
-/// several constraints a proof costs more than an evaluation. It changes time only; no test pins it.
-const WORTH_A_PROOF: f64 = 0.1;
-
-/// Most changes of B's active set, or of the distance, within a step. It changes time only; no test
-/// pins it.
-const MOST_EXCHANGES: usize = 12;
-
-/// Relative error of the distance that a step is made for, beyond which it is made again: what the
-/// normal turns is in proportion to its inverse. It changes time only; no test pins it.
-const UNLIKE: f64 = 0.1;
 
 /// How much a linearized constraint may be violated, relative to the body's size. Larger, points
 /// have to be moved farther into their body, which widens brackets; smaller, rounding changes the
@@ -48,20 +32,9 @@ const UNLIKE: f64 = 0.1;
 pub(super) const VIOLATED: f64 = 1e-13;
 
 /// Curvature times size, dimensionless, that is added where there is none: far below what any body
-/// has, it only bounds steps between two flat sides. It changes time only; no test pins it.
-const FLATTEST: f64 = 1e-10;
-
-/// Rounding of the curvature that B's freedom to follow leaves of the distance, relative to the
-/// inverse of that; dimensionless. Added, so that none is left below 0.
-///
-/// Smaller, steps between flat sides fail for want of a minimum; larger, they are shorter than
-/// need be. It changes time only; no test pins it.
-const FREEDOM_ROUNDING: f64 = 8.0 * f64::EPSILON;
-
-/// Distance of the points, relative to the smaller body, that a step is made for where it fails for
-/// the distance they have: near contact a small one lets the points turn the normal too far. It
-/// changes time only; no test pins it.
-const BLUNT_DISTANCE: f64 = 0.05;
+/// has, and far more than rounding leaves of that of a flat side, so that a program with no other
+/// curvature leads along the side to its end. It changes time only; no test pins it.
+pub(super) const FLATTEST: f64 = 1e-10;
 
 /// Least distance of the points that a step is made for, relative to the smaller body: nearer, the
 /// turn of their difference is lost in rounding. Double-double arithmetic goes on from there, so
@@ -259,7 +232,7 @@ impl Solver<'_> {
         let mut contacts = 0;
         let (mut of_a, mut of_b) = (Evaluated::none(), Evaluated::none());
         let (mut linear_a, mut linear_b) = (Linearized::none(), Linearized::none());
-        for _ in 0..MAX_ROUNDS {
+        for _ in 0..SEEK_ROUNDS {
             if self.options.exhausted(*rounds) {
                 return Err(Lost::after(*rounds));
             }
@@ -267,24 +240,16 @@ impl Solver<'_> {
             let inside_a = of_a.fill(simd, side_a, at.x);
             let inside_b = of_b.fill(simd, side_b, at.y);
             if !(inside_a && inside_b) {
-                // A step has led too far.
-                let (highest_a, highest_b) = (of_a.highest(), of_b.highest());
-                at.x = side_a.with_active(highest_a).brought_near(simd, at.x, of_a.jets[highest_a].value);
-                at.y = side_b.with_active(highest_b).brought_near(simd, at.y, of_b.jets[highest_b].value);
-                if !at.x.iter().chain(&at.y).all(|entry| entry.is_finite()) {
-                    return Err(Lost::after(*rounds));
-                }
+                let near = (of_a.brought_near(simd, side_a, at.x), of_b.brought_near(simd, side_b, at.y));
+                let (Some(x), Some(y)) = near else { return Err(Lost::after(*rounds)) };
+                (at.x, at.y) = (x, y);
                 continue;
             }
             let (local_a, local_b) = (side_a.localize(simd, &at.frame), side_b.localize(simd, &at.frame));
             let difference = apply::<S, f64>(&at.frame, subtract::<S, f64>(at.x, at.y));
             for (active, (evaluated, local)) in at.active.iter_mut().zip([(&of_a, &local_a), (&of_b, &local_b)]) {
                 if active.len == 0 {
-                    let highest = evaluated.highest();
-                    let plane = Plane::new(simd, &evaluated.jets[highest], local);
-                    active.index[0] = highest as u8;
-                    active.weight[0] = 1.0 / dot::<S, f64>(plane.gradient, plane.gradient).sqrt();
-                    active.len = 1;
+                    *active = Weighted::highest(simd, evaluated, local);
                 }
             }
             let [active_a, active_b] = &at.active;
@@ -303,7 +268,8 @@ impl Solver<'_> {
                     return Err(Lost { common, ..Lost::after(*rounds) });
                 }
             }
-            let longest = worth_a_bracket(self.limits).map(|limit| WORTH_A_PROOF * limit);
+            // With the weights of several constraints a proof costs more than an evaluation.
+            let longest = worth_a_bracket(self.limits).map(|limit| 0.1 * limit);
             let near = found.step.within(simd, longest);
             if prospect == Prospect::Decided && !near {
                 let Step { dx, dy, dn } = found.step;
@@ -319,7 +285,8 @@ impl Solver<'_> {
                     Ok(proven) => return Ok(EdgeProven { rounds: *rounds, ..proven }),
                     Err(touching) => contacts += u32::from(touching),
                 }
-                if contacts >= MOST_CONTACTS {
+                // The bodies seem to overlap: the general search finds their deepest point.
+                if contacts == 3 {
                     return Err(Lost::after(*rounds));
                 }
             }
@@ -340,8 +307,8 @@ impl Solver<'_> {
         Err(Lost::after(*rounds))
     }
 
-    /// Newton's step from points with `difference = x - y` in the basis, or where it fails one that
-    /// turns the normal by less.
+    /// Newton's step from points with `difference = x - y` in the basis, or where it fails one for
+    /// a distance of a twentieth of the smaller body, which turns the normal by less.
     #[inline(always)]
     fn step_near_contact<S: Simd>(
         &self,
@@ -350,7 +317,7 @@ impl Solver<'_> {
         b: &Linearized,
         difference: V3<f64>,
     ) -> Option<Found> {
-        for least in [LEAST_DISTANCE, BLUNT_DISTANCE] {
+        for least in [LEAST_DISTANCE, 0.05] {
             if let Some(found) = self.step(simd, a, b, (difference, least)) {
                 return Some(found);
             }
@@ -373,7 +340,7 @@ impl Solver<'_> {
         let mut distance = (difference[2] + a.shift() - b.shift()).max(least);
         let tau = [difference[0], difference[1]];
         let (mut active_a, mut active_b) = (a.active, b.active);
-        for exchange in 1..=MOST_EXCHANGES {
+        for exchange in 1..=MAX_CHANGES {
             let inverse = 1.0 / distance;
             // B's program times D: min ½ |τ + α - β|² - D n·dy + ½ D dyᵀ H dy.
             let mut hessian_b = b.hessian.map(|entry| entry * distance);
@@ -389,7 +356,9 @@ impl Solver<'_> {
             hessian_a[1] += k[1];
             hessian_a[3] += k[2];
             let pull = [(tau[0] - y_at_rest[0]) * inverse, (tau[1] - y_at_rest[1]) * inverse, 1.0];
-            let of_a = (VIOLATED * size_a, FLATTEST / size_a + FREEDOM_ROUNDING * inverse);
+            // B's freedom to follow takes from the curvature of the distance, and rounds: none may
+            // be left below 0.
+            let of_a = (VIOLATED * size_a, FLATTEST / size_a + 8.0 * f64::EPSILON * inverse);
             let found = minimize(simd, (&hessian_a, pull), a.rows(), active_a, of_a)?;
             let dx = found.step;
             active_a = found.active;
@@ -399,8 +368,9 @@ impl Solver<'_> {
             let of_dy = (&hessian_b, [-apart[0], -apart[1], -distance]);
             // How far apart they are then.
             let next = (difference[2] + dx[2] - dy[2]).max(least);
-            let unlike = (next - distance).abs() > UNLIKE * next.max(distance);
-            if unlike && next > least && 4 * exchange <= MOST_EXCHANGES {
+            // What the normal turns is in proportion to the inverse of the distance.
+            let unlike = (next - distance).abs() > 0.1 * next.max(distance);
+            if unlike && next > least && exchange <= 3 {
                 distance = next;
                 continue;
             }
@@ -459,11 +429,7 @@ impl Solver<'_> {
         let size = difference[0].abs() + difference[1].abs() + difference[2].abs();
         let rounding = TAYLOR_ROUNDING * (size + a.trust().span * share_a + b.trust().span * share_b);
         let upper = dot::<S, f64>(between, between).sqrt() * (1.0 + TAYLOR_ROUNDING) + displaced + rounding;
-        // Normals that agree may yet be off the way between the points: at edges and corners many
-        // do.
-        let attained = dot::<S, f64>(proven.normal, between);
-        let sideways = add_scaled::<S, f64>(between, -attained, proven.normal);
-        let off = proven.off.max(dot::<S, f64>(sideways, sideways).sqrt() / attained);
+        let off = proven.off.max(tangent_of_angle(simd, proven.normal, between));
         let (lower, upper) = match self.relation.judge(simd, &Bracket { upper, off, ..proven }, &at.frame, next) {
             Verdict::Proven { lower, upper } => (lower, upper),
             Verdict::Wide => return Err(false),
@@ -479,4 +445,13 @@ impl Solver<'_> {
         let trace = EdgeTrace { of_a, of_b, n, drift: Drift::default() };
         Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0, trace })
     }
+}
+
+/// The tangent of the angle between a unit normal and the way between two points. At edges and
+/// corners normals of both bodies may agree and yet be off it.
+#[inline(always)]
+pub(super) fn tangent_of_angle<S: Simd>(_: S, normal: V3<f64>, between: V3<f64>) -> f64 {
+    let along = dot::<S, f64>(normal, between);
+    let sideways = add_scaled::<S, f64>(between, -along, normal);
+    dot::<S, f64>(sideways, sideways).sqrt() / along
 }

@@ -16,10 +16,9 @@
 //! The proof is that of [`super`], with the tangent plane of `Σ w_i g_i <= 1` alone.
 
 use super::aggregate::{Evaluated, Weighted};
-use super::distance::VIOLATED;
+use super::distance::{FLATTEST, VIOLATED};
 use super::linearized::Linearized;
 use super::quadratic_program::minimize;
-use super::set_distance::{DECISIVE, FLATTEST, SETTLED_SQUARED};
 use super::share_inside::share_inside;
 use crate::body::Body;
 use crate::measure::frames::vector::{
@@ -27,27 +26,12 @@ use crate::measure::frames::vector::{
 };
 use crate::measure::options::Options;
 use crate::measure::solver::support_point::{Asked, Height};
-use crate::measure::solver::tangent_newton::{Side, TAYLOR_ROUNDING};
+use crate::measure::solver::tangent_newton::{AT_REST_SQUARED, LONGEST_MOVE, LONGEST_STEP, Side, TAYLOR_ROUNDING};
 use crate::polynomial::{Simd, WithSimd};
 use nalgebra::Vector3;
 
 /// Most evaluations. It changes time only; no test pins it.
 const MAX_ROUNDS: u32 = 10;
-
-/// Most programs for one step. It changes time only; no test pins it.
-const MOST_PROGRAMS: usize = 4;
-
-/// Longest step, in normalized coordinates relative to the body's size there, dimensionless, for
-/// which the linearization is valid.
-///
-/// Longer, values of high degrees grow too large to come back from in few rounds; shorter, more
-/// rounds lead along a side. `slab_cut_bodies_are_followed_to_their_edges` counts what is solved.
-const LONGEST_STEP: f64 = 0.5;
-
-/// Curvature times size, dimensionless, of the program for the first multipliers: its step is at
-/// most a tenth of the body, so that only constraints near the start count. It changes time only;
-/// no test pins it.
-const STIFF: f64 = 10.0;
 
 /// How far a body of several constraints reaches along a unit vector, as vectorized work.
 pub(in crate::measure) struct FarthestOfEdges<'a> {
@@ -103,12 +87,7 @@ impl Search<'_> {
                 return Err(rounds - 1);
             }
             if !evaluated.fill(simd, side, x) {
-                // A step has led too far.
-                let highest = evaluated.highest();
-                x = side.with_active(highest).brought_near(simd, x, evaluated.jets[highest].value);
-                if !x.iter().all(|entry| entry.is_finite()) {
-                    return Err(rounds);
-                }
+                x = evaluated.brought_near(simd, side, x).ok_or(rounds)?;
                 continue;
             }
             let (step, found) = self.step(simd, &mut linear, &evaluated, active).ok_or(rounds)?;
@@ -117,7 +96,7 @@ impl Search<'_> {
             if !square.is_finite() {
                 return Err(rounds);
             }
-            if square > DECISIVE * DECISIVE {
+            if square > LONGEST_MOVE * LONGEST_MOVE {
                 x = add_scaled::<S, f64>(x, (LONGEST_STEP / square.sqrt()).min(1.0), step);
                 continue;
             }
@@ -128,7 +107,7 @@ impl Search<'_> {
                 if let Some(height) = self.prove(simd, &evaluated, &active, (x, step)) {
                     return Ok(Height { iterations: rounds, ..height });
                 }
-                if square < SETTLED_SQUARED {
+                if square < AT_REST_SQUARED {
                     return Err(rounds);
                 }
             }
@@ -160,11 +139,13 @@ impl Search<'_> {
             let bent = active.sum(simd, evaluated).hessian;
             linear.fill(simd, evaluated.iter(), (&active, &bent), &self.local);
             if is_stiff {
-                linear.hessian = [STIFF / size, 0.0, 0.0, STIFF / size, 0.0, STIFF / size];
+                // Steps of a tenth of the body at most: only constraints near the start count.
+                let stiff = 10.0 / size;
+                linear.hessian = [stiff, 0.0, 0.0, stiff, 0.0, stiff];
             }
             let found = minimize(simd, (&linear.hessian, down), linear.rows(), linear.active, limits)?;
             let next = linear.weighted(&found.active, found.multipliers);
-            if !is_stiff && (next.set() == active.set() || programs >= MOST_PROGRAMS) {
+            if !is_stiff && (next.set() == active.set() || programs == 4) {
                 return Some((found.step, next));
             }
             (active, is_stiff) = (next, false);

@@ -1,15 +1,11 @@
 //! The constraints of one body around a trial point, as rows of quadratic programs.
 
 use super::aggregate::Weighted;
-use super::quadratic_program::{ActiveRows, MOST_ACTIVE, Row};
+use super::quadratic_program::{ActiveRows, Row};
 use crate::body::MAX_CONSTRAINTS;
 use crate::measure::frames::vector::{M3, V3, apply, apply_symmetric, dot, scaled};
+use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::polynomial::Simd;
-
-/// Constraints of a smaller value are left out of a step: it is no longer than a quarter of the
-/// body's size, along which values of the edge of a slab do not grow fivefold. It changes time
-/// only: what is left out is looked at again where the step leads.
-const FAR_INSIDE: f64 = 0.04;
 
 /// One body's constraints around a trial point, in the basis.
 pub(super) struct Linearized {
@@ -51,7 +47,9 @@ impl Linearized {
         (self.count, self.active) = (0, ActiveRows::default());
         for (i, value, gradient) in tangents {
             let is_active = active.iter().any(|(j, _)| j == i);
-            if !is_active && value <= FAR_INSIDE {
+            // Along a step within a quarter of the body values of the edge of a slab do not grow
+            // fivefold; what is left out is looked at again where the step leads.
+            if !is_active && value <= 0.04 {
                 continue;
             }
             let gradient = apply::<S, f64>(local, gradient);
@@ -95,7 +93,7 @@ impl Linearized {
 
     /// The constraints of active rows with their multipliers, metres, by those of unit rows.
     #[inline(always)]
-    pub(super) fn weighted(&self, active: &ActiveRows, multipliers: [f64; MOST_ACTIVE]) -> Weighted {
+    pub(super) fn weighted(&self, active: &ActiveRows, multipliers: [f64; MAX_ACTIVE]) -> Weighted {
         let mut weighted = Weighted { len: active.len, ..Weighted::default() };
         for (k, i) in active.iter().enumerate() {
             weighted.index[k] = self.index[i];

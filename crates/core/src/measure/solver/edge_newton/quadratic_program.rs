@@ -11,22 +11,14 @@
 //! (the ratio test of the dual simplex method).
 
 use crate::measure::frames::vector::{V3, add_scaled, apply_symmetric, basis, dot, scaled};
+use crate::measure::solver::active_constraints::MAX_ACTIVE;
+use crate::measure::solver::active_set_qp::MAX_CHANGES;
 use crate::polynomial::Simd;
-
-/// Most constraints that can hold with equality in general position in space.
-pub(super) const MOST_ACTIVE: usize = 3;
-
-/// Most changes of the active set.
-const MOST_CHANGES: usize = 10;
 
 /// Square of the sine between the normals of two active constraints, or determinant of those of
 /// three, below which they count as dependent. Larger, edges between sides that are tilted by
 /// little are refused, and left to the general search; smaller, rounding moves points along them.
 const DEPENDENT: f64 = 1e-9;
-
-/// Multiplier below which a constraint is let go: less than 0 by the rounding of a multiplier of
-/// about 1.
-const NEGATIVE: f64 = -1e-12;
 
 /// A constraint `n·d + e <= 0`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -40,7 +32,7 @@ pub(super) struct Row {
 /// Which of the constraints hold with equality.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ActiveRows {
-    pub(super) index: [u8; MOST_ACTIVE],
+    pub(super) index: [u8; MAX_ACTIVE],
     pub(super) len: usize,
 }
 
@@ -73,7 +65,7 @@ pub(super) struct Minimum {
     pub(super) step: V3<f64>,
     pub(super) active: ActiveRows,
     /// Of the active constraints, at least 0: `c + Q d + Σ μ_i n_i = 0`.
-    pub(super) multipliers: [f64; MOST_ACTIVE],
+    pub(super) multipliers: [f64; MAX_ACTIVE],
 }
 
 /// The minimiser, from a set of active constraints that is not empty; none if it is not found.
@@ -87,7 +79,7 @@ pub(super) fn minimize<S: Simd>(
     mut active: ActiveRows,
     (slack, smallest): (f64, f64),
 ) -> Option<Minimum> {
-    for _ in 0..MOST_CHANGES {
+    for _ in 0..MAX_CHANGES {
         let step = OnActive::new(simd, hessian, rows, &active, smallest)?.minimizer(simd, hessian, gradient);
         if let Checked::Minimum(multipliers) = check(simd, (hessian, gradient), rows, &mut active, step, slack)? {
             return Some(Minimum { step, active, multipliers });
@@ -138,7 +130,7 @@ fn enumerate<S: Simd>(
 /// What is said of a step along which the active constraints hold with equality.
 pub(super) enum Checked {
     /// It is the minimiser, with these multipliers.
-    Minimum([f64; MOST_ACTIVE]),
+    Minimum([f64; MAX_ACTIVE]),
     /// It is not; the active set has been changed by one constraint.
     Exchanged,
 }
@@ -163,7 +155,8 @@ pub(super) fn check<S: Simd>(
             least = k;
         }
     }
-    if multipliers[least] < NEGATIVE {
+    // Less than 0 by the rounding of a multiplier of about 1.
+    if multipliers[least] < -1e-12 {
         if active.len > 1 {
             active.remove(least);
             return Some(Checked::Exchanged);
@@ -192,10 +185,10 @@ pub(super) fn check<S: Simd>(
         }
         return Some(Checked::Minimum(multipliers));
     };
-    if active.len == MOST_ACTIVE {
+    if active.len == MAX_ACTIVE {
         let shares = in_terms_of_three(simd, rows, active, rows[next].normal)?;
         let mut first = (f64::INFINITY, None);
-        for k in 0..MOST_ACTIVE {
+        for k in 0..MAX_ACTIVE {
             let ratio = multipliers[k] / shares[k];
             if shares[k] > 0.0 && ratio < first.0 {
                 first = (ratio, Some(k));
@@ -264,7 +257,7 @@ impl OnActive {
                 let compliance = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
                 Some(Self { to: add_scaled::<S, f64>(scaled::<S, f64>(p.normal, a), b, q.normal), compliance })
             }
-            MOST_ACTIVE => {
+            MAX_ACTIVE => {
                 let dual = dual_basis(simd, rows, active)?;
                 let sum = add_scaled::<S, f64>(scaled::<S, f64>(dual[0], -row(0).excess), -row(1).excess, dual[1]);
                 Some(Self { to: add_scaled::<S, f64>(sum, -row(2).excess, dual[2]), compliance: [0.0; 6] })
@@ -283,7 +276,7 @@ impl OnActive {
 
 /// The multipliers μ of active constraints with `Σ μ_i n_i = pull`, as far as they span that.
 #[inline(always)]
-fn multipliers_of<S: Simd>(simd: S, rows: &[Row], active: &ActiveRows, pull: V3<f64>) -> Option<[f64; MOST_ACTIVE]> {
+fn multipliers_of<S: Simd>(simd: S, rows: &[Row], active: &ActiveRows, pull: V3<f64>) -> Option<[f64; MAX_ACTIVE]> {
     let row = |k: usize| &rows[usize::from(active.index[k])];
     match active.len {
         1 => Some([dot::<S, f64>(row(0).normal, pull), 0.0, 0.0]),
@@ -292,7 +285,7 @@ fn multipliers_of<S: Simd>(simd: S, rows: &[Row], active: &ActiveRows, pull: V3<
             let [a, b] = shares_of_two(simd, p, q, [dot::<S, f64>(p.normal, pull), dot::<S, f64>(q.normal, pull)]);
             Some([a, b, 0.0])
         }
-        MOST_ACTIVE => in_terms_of_three(simd, rows, active, pull),
+        MAX_ACTIVE => in_terms_of_three(simd, rows, active, pull),
         _ => None,
     }
 }

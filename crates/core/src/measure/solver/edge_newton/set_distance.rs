@@ -15,7 +15,7 @@
 //! Proofs are those of [`super`], with the set's support function in place of a second body.
 
 use super::aggregate::{Evaluated, Weighted};
-use super::distance::VIOLATED;
+use super::distance::{FLATTEST, VIOLATED, tangent_of_angle};
 use super::linearized::Linearized;
 use super::quadratic_program::minimize;
 use super::share_inside::share_inside;
@@ -28,54 +28,16 @@ use crate::measure::frames::vector::{
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::exact_shape::{
-    Cuboid, Cylinder, LONGEST_STEP, Offset, Projectable, Segment, SeparatingPlane, WORTH_A_BRACKET_SQUARED, cold_start,
-    seen_from, separating_plane,
+    Cuboid, Cylinder, Offset, Projectable, Segment, SeparatingPlane, cold_start, seen_from, separating_plane,
 };
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{ALIGNED, Plane, Relative, Side, TAYLOR_ROUNDING, moved};
+use crate::measure::solver::tangent_newton::{
+    ALIGNED, AT_REST_SQUARED, FEATURES, LONGEST_MOVE, LONGEST_STEP, PATIENCE, RETREATS, Relative, SEEK_ROUNDS, Side,
+    TAYLOR_ROUNDING, WORTH_A_BRACKET, moved,
+};
 use crate::polynomial::{Simd, WithSimd};
 use nalgebra::Vector3;
-
-/// Most evaluations from one start. It changes time only; no test pins it.
-const MAX_ROUNDS: u32 = 16;
-
-/// Most times that a program is solved again for another feature of the set. It changes time only;
-/// no test pins it.
-const MOST_FEATURES: usize = 5;
-
-/// Longest first step from the last answer, in normalized coordinates relative to the body's size
-/// there, dimensionless: a longer one is no continuation. It changes time only; no test pins it.
-const LONGEST_FOLLOWED_STEP: f64 = 0.25;
-
-/// How often a step that led into the set is halved. It changes time only; no test pins it.
-const HALVINGS: u32 = 2;
-
-/// How often a point that may be a common one is tried where steps find no minimum outside of the
-/// set. It changes time only; no test pins it.
-const MOST_CONTACTS: u32 = 1;
-
-/// Length of a step, as above, beyond which no bracket is expected to decide. No larger than a
-/// quarter: bounds of curvature hold as far from the body as that.
-pub(super) const DECISIVE: f64 = 0.25;
-
-/// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
-/// It changes time only; no test pins it.
-pub(super) const SETTLED_SQUARED: f64 = 1e-22;
-
-/// How much farther towards the interior point a common point is looked for than values ask for,
-/// dimensionless: they are convex along the way, and rounding counts. It changes time only; no test
-/// pins it.
-const INWARD: f64 = 1e-6;
-
-/// Evaluations after which steps are shortened, so that they do not go around in circles. It
-/// changes time only; no test pins it.
-const PATIENCE: u32 = 8;
-
-/// Curvature times size, dimensionless, that is added where there is none: far more than rounding
-/// leaves of that of a flat side, so that a program with no other curvature leads along the side to
-/// its end. It changes time only; no test pins it.
-pub(super) const FLATTEST: f64 = 1e-10;
 
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
@@ -287,7 +249,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         let mut linear = Linearized::none();
         linear.fill(simd, spot.iter(), (&spot.active, &spot.hessian), &local);
         let Found { step, active, .. } = self.step(simd, &linear, x, &seen)?;
-        if !(self.side.relative_square(simd, &local, step) < LONGEST_FOLLOWED_STEP * LONGEST_FOLLOWED_STEP) {
+        if !(self.side.relative_square(simd, &local, step) < LONGEST_MOVE * LONGEST_MOVE) {
             return None;
         }
         let moved = apply_transposed::<S, f64>(&seen.frame, step);
@@ -306,20 +268,15 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
     #[inline(always)]
     fn run<S: Simd>(&self, simd: S, mut at: Iterate, rounds: &mut u32) -> Result<EdgeShapeProven, Lost> {
         let side = &self.side;
-        let (mut before, mut halved, mut contacts) = (None, 0, 0);
+        let (mut before, mut halved, mut touched) = (None, 0, false);
         let (mut evaluated, mut linear) = (Evaluated::none(), Linearized::none());
-        for round in 1..=MAX_ROUNDS {
+        for round in 1..=SEEK_ROUNDS {
             if self.options.exhausted(*rounds) {
                 return Err(Lost::Elsewhere);
             }
             *rounds += 1;
             if !evaluated.fill(simd, side, at.x) {
-                // A step has led too far.
-                let highest = evaluated.highest();
-                at.x = side.with_active(highest).brought_near(simd, at.x, evaluated.jets[highest].value);
-                if !at.x.iter().all(|entry| entry.is_finite()) {
-                    return Err(Lost::Elsewhere);
-                }
+                at.x = evaluated.brought_near(simd, side, at.x).ok_or(Lost::Elsewhere)?;
                 (at.seen, before) = (self.set.offset(simd, at.x), None);
                 continue;
             }
@@ -327,44 +284,35 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
                 if let Some(common) = self.common(simd, at.x, &evaluated) {
                     return Ok(EdgeShapeProven { rounds: *rounds, ..common });
                 }
-                at.x = scaled::<S, f64>(
-                    add::<S, f64>(at.x, before.filter(|_| halved < HALVINGS).ok_or(Lost::Elsewhere)?),
-                    0.5,
-                );
+                let old = before.filter(|_| halved < RETREATS).ok_or(Lost::Elsewhere)?;
+                at.x = scaled::<S, f64>(add::<S, f64>(at.x, old), 0.5);
                 at.seen = self.set.offset(simd, at.x);
                 halved += 1;
                 continue;
             }
             let local = side.localize(simd, &at.seen.frame);
             if at.active.len == 0 {
-                let highest = evaluated.highest();
-                let plane = Plane::new(simd, &evaluated.jets[highest], &local);
-                at.active.index[0] = highest as u8;
-                at.active.weight[0] = 1.0 / dot::<S, f64>(plane.gradient, plane.gradient).sqrt();
-                at.active.len = 1;
+                at.active = Weighted::highest(simd, &evaluated, &local);
             }
             let bent = at.active.sum(simd, &evaluated).hessian;
             linear.fill(simd, evaluated.iter(), (&at.active, &bent), &local);
             let Some(found) = self.step(simd, &linear, at.x, &at.seen) else {
-                // The distance decreases all the way to the set without leaving the body.
-                if contacts == MOST_CONTACTS {
-                    return Err(Lost::Elsewhere);
-                }
-                contacts += 1;
-                let nearest = self.inner().ok_or(Lost::Elsewhere)?.project(simd, at.x);
-                before = Some(at.x);
-                at = self.untried(simd, nearest);
+                // The distance decreases all the way to the set without leaving the body: there may
+                // be a common point.
+                let inner = self.inner().filter(|_| !touched).ok_or(Lost::Elsewhere)?;
+                (touched, before) = (true, Some(at.x));
+                at = self.untried(simd, inner.project(simd, at.x));
                 continue;
             };
             let square = side.relative_square(simd, &local, found.step);
             if !square.is_finite() {
                 return Err(Lost::Elsewhere);
             }
-            if square < WORTH_A_BRACKET_SQUARED || self.is_decided(square, found.next.distance) {
+            if square < WORTH_A_BRACKET * WORTH_A_BRACKET || self.is_decided(square, found.next.distance) {
                 if let Some(proven) = self.prove(simd, &at, &found, (&evaluated, &local)) {
                     return Ok(EdgeShapeProven { rounds: *rounds, ..proven });
                 }
-                if square < SETTLED_SQUARED {
+                if square < AT_REST_SQUARED {
                     return Err(Lost::Wide);
                 }
             }
@@ -383,7 +331,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
     #[inline(always)]
     fn is_decided(&self, square: f64, distance: f64) -> bool {
         let width = square * square.sqrt() * self.side.body().trust().reach;
-        square < DECISIVE * DECISIVE && self.goal.met(distance - width, distance + width)
+        square < LONGEST_MOVE * LONGEST_MOVE && self.goal.met(distance - width, distance + width)
     }
 
     /// A set that lies in what the set stands for, if there is one.
@@ -399,7 +347,8 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
     fn common<S: Simd>(&self, simd: S, x: V3<f64>, evaluated: &Evaluated) -> Option<EdgeShapeProven> {
         let inner = self.inner()?;
         let (highest, least) = (evaluated.jets[evaluated.highest()].value, self.side.body().min_value());
-        let share = ((highest - 1.0) / (highest - least)).max(0.0) * (1.0 + INWARD);
+        // Values are convex along the way, and rounding counts.
+        let share = ((highest - 1.0) / (highest - least)).max(0.0) * (1.0 + 1e-6);
         let x = add_scaled::<S, f64>(x, share, subtract::<S, f64>(self.interior(simd), x));
         let x = inner.project(simd, x);
         let [_, bound] = self.side.highest(simd, x);
@@ -437,7 +386,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
                 to = add::<S, f64>(from, way);
             }
             let mut next = self.set.offset(simd, moved::<S, f64>(x, to, &seen.frame));
-            if next.feature == feature || !(next.distance > 0.0) || again == MOST_FEATURES {
+            if next.feature == feature || !(next.distance > 0.0) || again == FEATURES {
                 let active = linear.weighted(&found.active, found.multipliers);
                 return Some(Found { step: to, next, active });
             }
@@ -491,13 +440,9 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         let between = subtract::<S, f64>(x, nearest);
         let rounding = rounding + TAYLOR_ROUNDING * share * body.trust().span;
         let upper = dot::<S, f64>(between, between).sqrt() + rounding;
-        // Normals that agree may yet be off the way between the points: at edges and corners many
-        // do.
         let off = subtract::<S, f64>(outward, found.next.frame[2]);
         let off = dot::<S, f64>(off, off).sqrt() + there.gradient_error * multiplier;
-        let attained = dot::<S, f64>(n, between);
-        let sideways = add_scaled::<S, f64>(between, -attained, n);
-        let off = off.max(dot::<S, f64>(sideways, sideways).sqrt() / attained);
+        let off = off.max(tangent_of_angle(simd, n, between));
         let narrow = upper - lower <= self.tolerance && off <= ALIGNED;
         if !(lower > 0.0 && lower <= upper && (narrow || self.goal.met(lower, upper))) {
             return None;

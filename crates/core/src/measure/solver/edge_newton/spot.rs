@@ -1,8 +1,8 @@
 //! Where a body of several constraints was met, for the next query of the pair.
 
 use super::aggregate::{Evaluated, Weighted};
-use super::quadratic_program::MOST_ACTIVE;
 use crate::measure::frames::vector::{V3, add, add_scaled, apply_symmetric, dot};
+use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::polynomial::{NumberJet, Simd};
 
 /// A witness with the constraints that are active there, for the next query of the pair.
@@ -13,7 +13,7 @@ pub(super) struct Spot {
     /// With multipliers, metres.
     pub(super) active: Weighted,
     /// Values and gradients of the active constraints there, in normalized coordinates.
-    tangents: [(f64, V3<f64>); MOST_ACTIVE],
+    tangents: [(f64, V3<f64>); MAX_ACTIVE],
     /// Sum of their Hessians with their multipliers: xx, xy, xz, yy, yz, zz.
     pub(super) hessian: [f64; 6],
 }
@@ -27,7 +27,7 @@ impl Spot {
         active: Weighted,
         (evaluated, delta): (&Evaluated, V3<f64>),
     ) -> Self {
-        let mut tangents = [(0.0, [0.0; 3]); MOST_ACTIVE];
+        let mut tangents = [(0.0, [0.0; 3]); MAX_ACTIVE];
         for k in 0..active.len {
             tangents[k] = extrapolated(simd, &evaluated.jets[usize::from(active.index[k])], delta);
         }

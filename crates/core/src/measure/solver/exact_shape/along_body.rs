@@ -5,10 +5,10 @@
 //! become as short as the body is thick. With n the direction of -∇g the residual `Tᵀv + (n·v) q`
 //! is the same, and the step starts from `α = 0`.
 
-use super::newton::{FEATURES, Linearized, corrected};
+use super::newton::{Linearized, corrected};
 use super::projectable::{Offset, Projectable};
 use crate::measure::frames::vector::{V3, basis, scaled};
-use crate::measure::solver::tangent_newton::{Plane, Side, SurfaceCurvature, moved};
+use crate::measure::solver::tangent_newton::{FEATURES, Plane, Side, SurfaceCurvature, moved};
 use crate::polynomial::{NumberJet, Simd, WithSimd};
 
 /// A step from a point x, as vectorized work: what is inlined where it is seldom needed makes the

@@ -2,7 +2,7 @@
 
 use super::projectable::{ON, Offset, Projectable};
 use crate::measure::frames::vector::{V3, add, basis, dot, normalized, scaled, subtract};
-use crate::polynomial::Simd;
+use crate::polynomial::{Number, Simd};
 
 /// `|y_i| <= half_extents[i]`, metres.
 #[derive(Clone, Copy, Debug)]
@@ -11,11 +11,11 @@ pub(in crate::measure) struct Cuboid {
 }
 
 /// Most coordinates of a quadratic's minimiser that are found one after the other to lie on faces.
-const ROUNDS: usize = 4;
+pub(super) const ROUNDS: usize = 4;
 
 /// Least pivot that a vector is divided by: small enough that a step along what is flat but not
 /// level leaves every body, and large enough that its square is finite.
-const FLATTEST: f64 = 1e-100;
+pub(super) const FLATTEST: f64 = 1e-100;
 
 impl Projectable for Cuboid {
     #[inline(always)]
@@ -159,8 +159,9 @@ impl Projectable for Cuboid {
 /// rounding where M is nearly singular along some directions. Pivots count by their amount, and at
 /// least [`FLATTEST`]: M is semidefinite up to rounding, and so the solution descends.
 #[inline(always)]
-pub(super) fn solve<S: Simd>(_: S, m: &[V3<f64>; 3], v: V3<f64>) -> V3<f64> {
-    let inverse = |pivot: f64| 1.0 / pivot.abs().max(FLATTEST);
+pub(super) fn solve<S: Simd, N: Number<S>>(simd: S, m: &[V3<N>; 3], v: V3<N>) -> V3<N> {
+    let (one, flattest) = (N::splat(simd, 1.0), N::splat(simd, FLATTEST));
+    let inverse = |pivot: N| one / pivot.abs().max(flattest);
     let first = inverse(m[0][0]);
     let (l10, l20) = (m[1][0] * first, m[2][0] * first);
     let second = inverse(m[1][1] - l10 * m[1][0]);

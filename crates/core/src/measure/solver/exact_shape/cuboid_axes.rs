@@ -12,24 +12,15 @@ use crate::measure::frames::vector::{M3, V3, dot};
 use crate::polynomial::{Scalar, gamma};
 use nalgebra::Vector3;
 
-/// Largest angle, radians, between the normal of an answer and that of the solution.
+/// Largest angle, radians, between the normal of an answer and that of the solution; and between
+/// two edges whose axis is not the answer and does not count as a face that others may be beside:
+/// see [`CuboidAxes::least_overlap`].
 ///
-/// Larger, gradients would be off by more than 1e-6; smaller, balls beside edges and boxes that
-/// touch are left to the general search. Exercised by `signed_shapes_have_gradients`.
+/// Larger, gradients would be off by more than 1e-6, and depths by up to this times the smaller
+/// edges; smaller, balls beside edges and boxes that touch are left to the general search, and axes
+/// are off by more than this. Exercised by `signed_shapes_have_gradients` and
+/// `nearly_parallel_edges_keep_their_bracket`.
 pub(super) const ALIGNED: f64 = 1e-7;
-
-/// Sine of the angle between two edges below which the axis across them is not the answer, and
-/// theirs does not count as a face that others may be beside: see [`CuboidAxes::least_overlap`].
-///
-/// Larger, the depth is off by up to this times the smaller edges; smaller, the axis is off by more
-/// than 1e-7. Exercised by `nearly_parallel_edges_keep_their_bracket`.
-const PARALLEL: f64 = 1e-7;
-
-/// Sine above which an axis is as accurate as any: the neighbours of a slim face are across edges
-/// that are nearly at right angles.
-///
-/// Only that it is far from [`PARALLEL`] and from 1 matters; no test pins it.
-const STEEP: f64 = 0.5;
 
 /// Two boxes, A as seen from B.
 #[derive(Clone, Copy, Debug)]
@@ -76,7 +67,7 @@ pub(super) struct LeastOverlap {
 impl CuboidAxis {
     /// Whether it is across the edges that it is taken to be across.
     pub(super) fn is_accurate(&self) -> bool {
-        self.length > PARALLEL
+        self.length > ALIGNED
     }
 }
 
@@ -123,10 +114,11 @@ impl CuboidAxes {
     pub(super) fn least_overlap(&self, elsewhere: f64) -> LeastOverlap {
         let (axes, error) = (self.all(), self.error());
         let overlap = |axis: &CuboidAxis| axis.width - axis.apart.abs();
-        let steep = axes.iter().filter(|axis| axis.length > STEEP);
-        let of_steep = steep.map(|axis| overlap(axis) - error / axis.length).fold(f64::INFINITY, f64::min);
-        let slim = axes.iter().filter(|axis| axis.length <= STEEP);
-        let lower = slim.fold(of_steep, |lower, axis| {
+        // As accurate as any: neighbours of a slim face are across edges nearly at right angles.
+        let is_steep = |axis: &&CuboidAxis| axis.length > 0.5;
+        let of_steep =
+            axes.iter().filter(is_steep).map(|axis| overlap(axis) - error / axis.length).fold(f64::INFINITY, f64::min);
+        let lower = axes.iter().filter(|axis| !is_steep(axis)).fold(of_steep, |lower, axis| {
             // A NaN is no bound: without length there is no direction.
             let of_axis = (overlap(axis) - error / axis.length).max(f64::NEG_INFINITY);
             lower.min(of_axis.max(of_steep - axis.slim * (1.0 + gamma(4))))

@@ -33,9 +33,6 @@ use crate::measure::frames::vector::V3;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
-/// Most of Newton's steps on an arc; the bound holds after any number, but may be wide.
-const MOST_STEPS: u32 = 32;
-
 /// Number of directions that may be found: across 3 sides, the axis, and 3 edges and the axis;
 /// towards 8 corners, and on 6 arcs across each edge.
 const MOST: usize = 7 + 8 + 18;
@@ -305,7 +302,8 @@ impl EllipseArc {
                 return None;
             }
             let g = x - y * u - bent * u / root;
-            if g <= tolerance || steps == MOST_STEPS {
+            // The bound holds after any number of steps, but may be wide.
+            if g <= tolerance || steps == 32 {
                 break (g, root);
             }
             let share = zeta / root;

@@ -21,16 +21,12 @@ use crate::measure::options::Options;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::step_acceleration::{Correction, Last, Series};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{ALIGNED, Extrapolated, Plane, Relative, Side, SurfaceCurvature, moved};
+use crate::measure::solver::tangent_newton::{
+    ALIGNED, AT_REST_SQUARED, Extrapolated, FLATTEST, LONGEST_MOVE, LONGEST_STEP, PATIENCE, Plane, RETREATS, Relative,
+    SEEK_ROUNDS, Side, SurfaceCurvature, WORTH_A_BRACKET, moved,
+};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd, dispatch};
 use nalgebra::Vector3;
-
-/// Most evaluations of Newton's method from one start: of a body that is not thin, and of a thin
-/// one.
-const MAX_ROUNDS: [u32; 2] = [16, 20];
-
-/// How often a point that a step led too far from the body is brought back; as above.
-const MOST_BROUGHT: [u32; 2] = [1, 3];
 
 /// Square of the tangent of the angle between the normals of a thin body and of the set's offset
 /// surface, dimensionless, above which Newton's method takes the tangents of the body: 3 degrees.
@@ -39,43 +35,9 @@ const MOST_BROUGHT: [u32; 2] = [1, 3];
 /// nothing. It changes time only.
 const TILTED_SQUARED: f64 = 3e-3;
 
-/// Square of a step in normalized coordinates, relative to the body's size there, dimensionless, up
-/// to which the bracket where it leads is computed.
-///
-/// Larger, more brackets are too wide to end on; smaller, an evaluation more is taken. It changes
-/// time only: `.ci/instructions` pins it.
-pub(in crate::measure) const WORTH_A_BRACKET_SQUARED: f64 = 1e-6;
-
-/// Square of a step, as above, dimensionless, after which only rounding is left: 1e-11 of the body.
-///
-/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Exercised by
-/// `smooth_bodies_against_shapes`.
-const SETTLED_SQUARED: f64 = 1e-22;
-
-/// Longest step in normalized coordinates for which the linearization is valid, relative to the
-/// body's size there; dimensionless.
-///
-/// Longer, Newton's method diverges from cold starts; shorter, it needs more rounds:
-/// `smooth_bodies_against_shapes` counts what is solved.
-pub(in crate::measure) const LONGEST_STEP: f64 = 0.5;
-
-/// Longest first step from the last answer, as above, dimensionless; a longer one is no
-/// continuation, and the support table starts it.
-///
-/// Longer, bad hints take more rounds than a cold start; shorter, good ones are dropped:
-/// `smooth_bodies_against_shapes` counts what is solved.
-const LONGEST_FOLLOWED_STEP: f64 = 0.25;
-
-/// Curvature times size, dimensionless, that is added where there is none, as in `continuation`.
-/// Exercised by `boxes_side_by_side`.
-pub(in crate::measure) const FLATTEST: f64 = 1e-20;
-
-/// Evaluations after which long steps that no series has corrected are shortened, so that they do
-/// not go around in circles.
-const PATIENCE: u32 = 8;
-
-/// How often a step that led behind the set or into it is halved.
-const HALVINGS: u32 = 6;
+/// Square of the longest step, in normalized coordinates relative to the body's size there,
+/// dimensionless, after which the bracket where it leads is computed.
+pub(in crate::measure) const WORTH_A_BRACKET_SQUARED: f64 = WORTH_A_BRACKET * WORTH_A_BRACKET;
 
 /// What is kept of an answer for the next query of the pair: the body's constraint at the nearest
 /// point, all in normalized coordinates.
@@ -244,7 +206,7 @@ impl<P: Projectable> ExactPair<'_, P> {
         let plane = Plane::new(simd, &trace.jet, &local);
         let bend = SurfaceCurvature::new(simd, &trace.jet, &local);
         let found = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest())?;
-        if !(side.relative_square(simd, &local, found.step) < LONGEST_FOLLOWED_STEP * LONGEST_FOLLOWED_STEP) {
+        if !(side.relative_square(simd, &local, found.step) < LONGEST_MOVE * LONGEST_MOVE) {
             return None;
         }
         let predicted = add::<S, f64>(trace.point, apply_transposed::<S, f64>(&local, found.step));
@@ -279,12 +241,11 @@ impl<P: Projectable> ExactPair<'_, P> {
         rounds: &mut u32,
     ) -> Ended {
         let is_thin = self.body.outline().is_thin();
-        let [most_rounds, most_brought] = [MAX_ROUNDS, MOST_BROUGHT].map(|most| most[usize::from(is_thin)]);
         let (mut before, mut halved) = (None, 0);
         let (mut brought, mut series) = (0, Series::default());
-        for round in 1..=most_rounds {
+        for round in 1..=SEEK_ROUNDS {
             while !(seen.distance > 0.0) {
-                let Some(old) = before.filter(|_| apart && halved < HALVINGS) else { return Ended::Lost };
+                let Some(old) = before.filter(|_| apart && halved < RETREATS) else { return Ended::Lost };
                 halved += 1;
                 x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
                 seen = self.set.offset(simd, x);
@@ -296,7 +257,7 @@ impl<P: Projectable> ExactPair<'_, P> {
             let (jet, inside) = side.jet(simd, x);
             if !inside {
                 // A step has led too far.
-                if brought == most_brought || !(jet.value < f64::INFINITY) {
+                if brought == RETREATS || !(jet.value < f64::INFINITY) {
                     return Ended::Lost;
                 }
                 brought += 1;
@@ -320,7 +281,7 @@ impl<P: Projectable> ExactPair<'_, P> {
             let bend = SurfaceCurvature::new(simd, &jet, &local);
             let Some(found) = newton(simd, &self.set, x, &seen, (&plane, &bend), self.smallest()) else {
                 // The step before has led behind the body.
-                let Some(old) = before.filter(|_| halved < HALVINGS) else { return Ended::Lost };
+                let Some(old) = before.filter(|_| halved < RETREATS) else { return Ended::Lost };
                 halved += 1;
                 x = scaled::<S, f64>(add::<S, f64>(x, old), 0.5);
                 (seen, series) = (self.set.offset(simd, x), Series::default());
@@ -343,7 +304,7 @@ impl<P: Projectable> ExactPair<'_, P> {
                     let trace = trace_of(simd, &jet, (side.normalized(simd, x), delta), predicted);
                     return Ended::Proven(ExactProven { rounds: *rounds, trace: Some(trace), ..proven });
                 }
-                if square < SETTLED_SQUARED {
+                if square < AT_REST_SQUARED {
                     return Ended::Wide(self.about(simd, to, &seen));
                 }
             }

@@ -14,15 +14,9 @@
 
 use super::projectable::Projectable;
 use crate::measure::frames::vector::{V3, add, dot, scaled, subtract};
-use crate::measure::solver::tangent_newton::{Side, TAYLOR_ROUNDING};
+use crate::measure::solver::tangent_newton::{PATIENCE, SEEK_ROUNDS, Side, TAYLOR_ROUNDING};
 use crate::polynomial::{NumberJet, Simd, WithSimd};
 use nalgebra::Vector3;
-
-/// Most evaluations: bodies and sets that touch within rounding are left open by all of them.
-const MAX_ROUNDS: u32 = 24;
-
-/// Evaluations after which steps are Newton's own wherever they are.
-const FROM_AFAR: u32 = 8;
 
 /// Length of a step, relative to the set, dimensionless, after which the least value is near enough
 /// for Newton's method on the distance to start from.
@@ -70,7 +64,8 @@ impl<P: Projectable> WithSimd for LevelProblem<'_, P> {
     fn with_simd<S: Simd>(self, simd: S) -> (Level, u32) {
         let Self { set, side, start: mut y, .. } = self;
         let (mut last, mut least, mut apart, mut rounds) = (y, f64::INFINITY, None, 0);
-        let most = self.most.min(MAX_ROUNDS);
+        // Bodies and sets that touch within rounding are left open by all of them.
+        let most = self.most.min(SEEK_ROUNDS);
         for round in 1..=most {
             rounds = round;
             let (jet, inside) = side.jet(simd, y);
@@ -121,7 +116,8 @@ impl<P: Projectable> Descent<'_, P> {
     ) -> V3<f64> {
         let hessian = self.side.hessian(simd, jet);
         let value = jet.value.max(1.0);
-        let power = if round > FROM_AFAR { 0.0 } else { POWER / value * (1.0 - 1.0 / value) };
+        // Steps that have not arrived by then are Newton's own wherever they are.
+        let power = if round > PATIENCE { 0.0 } else { POWER / value * (1.0 - 1.0 / value) };
         let mut straight = hessian;
         for (entry, (i, j)) in straight.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
             *entry -= power * gradient[i] * gradient[j];

@@ -18,27 +18,14 @@ use super::cylinder::Cylinder;
 use super::distance::interior;
 use super::level::{Descent, Errors};
 use super::placed::seen_from;
-use super::projectable::Projectable;
+use super::projectable::{ON, Projectable};
 use crate::body::{Body, ClosedForm, ExactShape};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{V3, add, dot, scaled, subtract};
 use crate::measure::options::Options;
-use crate::measure::solver::tangent_newton::{ALIGNED, Relative, Side, TAYLOR_ROUNDING};
+use crate::measure::solver::tangent_newton::{ALIGNED, Relative, SEEK_ROUNDS, Side, TAYLOR_ROUNDING};
 use crate::polynomial::{NumberJet, Simd, WithSimd, gamma};
 use nalgebra::Vector3;
-
-/// Most evaluations: 13 are the most that random pairs apart take.
-///
-/// Larger, pairs that are not settled start the general search later; smaller, more are left to it.
-/// Exercised by `smooth_bodies_over_shapes_are_settled_alone`.
-const MAX_ROUNDS: u32 = 16;
-
-/// Largest share of a set's reach, dimensionless, that a point which counts as on a face is off it,
-/// for [`super::projectable::ON`], twice for rounding.
-///
-/// Smaller, the second bound would be too high by what is off; larger, it is lower than need be.
-/// `levels_over_shapes` compares both bounds with 200 bits.
-const OFF_FACE: f64 = 2e-12;
 
 /// A smooth body over one with a closed form; as vectorized work.
 pub(in crate::measure) struct LevelQuery<'a> {
@@ -103,7 +90,7 @@ impl LevelQuery<'_> {
         let mut y = set.project(simd, from);
         let descent = Descent { set, side: &side };
         let (mut last, mut least) = (y, f64::INFINITY);
-        let most = self.options.max_iterations().min(MAX_ROUNDS);
+        let most = self.options.max_iterations().min(SEEK_ROUNDS);
         for round in 1..=most {
             if self.options.exhausted(round - 1) {
                 return Err(round - 1);
@@ -170,7 +157,9 @@ impl LevelQuery<'_> {
         let pull = scaled::<S, f64>(gradient, -1.0 / length);
         let slide = length * (set.slide(simd, y, pull) + TAYLOR_ROUNDING) + gradient_error;
         let floor = constraint.curvature_floor;
-        let bowl = slide * slide / (2.0 * floor) * (1.0 + TAYLOR_ROUNDING) + length * OFF_FACE * set.reach();
+        // A point that counts as on a face is off it by as much; twice for rounding.
+        let off_face = 2.0 * (1.0 - ON) * set.reach();
+        let bowl = slide * slide / (2.0 * floor) * (1.0 + TAYLOR_ROUNDING) + length * off_face;
         let linear = -beyond + gradient_error * across;
         let fall = if floor > 0.0 && bowl < linear { bowl } else { linear };
         let size = jet.value.abs() + length * (set.reach() + y[0].abs() + y[1].abs() + y[2].abs());

@@ -26,11 +26,11 @@ mod start;
 
 pub(in crate::measure) use cuboid::Cuboid;
 pub(in crate::measure) use cylinder::Cylinder;
-pub(in crate::measure) use distance::{
-    ExactLost, ExactProven, ExactTrace, FLATTEST, LONGEST_STEP, WORTH_A_BRACKET_SQUARED, common,
-};
+pub(in crate::measure) use distance::{ExactLost, ExactProven, ExactTrace, WORTH_A_BRACKET_SQUARED, common};
 pub(in crate::measure) use growth::growth_of_shapes;
-pub(in crate::measure) use lanes::{LaneBracket, LaneMove, LaneOffset, LaneSet, bracket, newton, start};
+pub(in crate::measure) use lanes::{
+    LaneBracket, LaneLeast, LaneMove, LaneOffset, LanePair, LaneSet, bracket, newton, start,
+};
 pub(in crate::measure) use line::{Line, Target};
 pub(in crate::measure) use minimum::{LevelMinimum, LevelQuery};
 pub(in crate::measure) use placed::{

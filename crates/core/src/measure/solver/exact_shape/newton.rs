@@ -17,11 +17,8 @@
 
 use super::projectable::{Offset, Projectable};
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, dot, scaled};
-use crate::measure::solver::tangent_newton::{Plane, SurfaceCurvature, Symmetric2, moved};
+use crate::measure::solver::tangent_newton::{FEATURES, Plane, SurfaceCurvature, Symmetric2, moved};
 use crate::polynomial::Simd;
-
-/// Most corrections of a step for features of the set that it leads to.
-pub(super) const FEATURES: usize = 5;
 
 /// A step and where it leads.
 #[derive(Clone, Copy, Debug)]

@@ -26,23 +26,14 @@ use crate::measure::frames::vector::{
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::Simd;
 
-/// Most turns on the ellipsoid.
-pub(super) const ELLIPSOID_TURNS: usize = 4;
-
-/// Most steps on the ellipsoid of a thin body.
-const THIN_STEPS: usize = 6;
-
-/// Square of a step on the ellipsoid, radians squared in normalized coordinates, that is left to
-/// Newton's method on the body itself.
-///
-/// Larger, it starts too far away; smaller, more steps are taken than pay. It changes time only.
-const SMALL_STEP: f64 = 3e-2;
+/// Most turns of the normal, or of a thin body steps of the point, on the ellipsoid.
+pub(super) const ELLIPSOID_TURNS: usize = 6;
 
 /// Most looks at the support table.
 pub(super) const TABLE_LOOKS: usize = 3;
 
-/// Square of a turn of the normal, radians squared, that is left to Newton's method on the body
-/// itself.
+/// Square of a turn of the normal, radians squared, or of such a step in normalized coordinates,
+/// that is left to Newton's method on the body itself.
 ///
 /// Larger, it starts too far away; smaller, support tables are read once more than needed. It
 /// changes time only; no test pins it.
@@ -136,7 +127,7 @@ fn on_the_ellipsoid<S: Simd, P: Projectable>(
     let radius = body.outline().radius();
     let mut z = normalized(simd, apply::<S, f64>(&linear, apply_transposed::<S, f64>(&relative.rotation, n)));
     z = scaled::<S, f64>(z, -1.0);
-    for _ in 0..THIN_STEPS {
+    for _ in 0..ELLIPSOID_TURNS {
         let out = scaled::<S, f64>(apply::<S, f64>(&inverse, z), radius);
         let out = apply::<S, f64>(&relative.rotation, out);
         let seen = set.offset(simd, add::<S, f64>(relative.origin, out));
@@ -171,7 +162,7 @@ fn on_the_ellipsoid<S: Simd, P: Projectable>(
             break;
         }
         z = normalized(simd, add::<S, f64>(z, step));
-        if square < SMALL_STEP {
+        if square < SMALL_TURN {
             break;
         }
     }

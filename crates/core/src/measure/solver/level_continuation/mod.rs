@@ -53,9 +53,9 @@ use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::vector::{V3, add, apply_symmetric, apply_transposed, basis, dot, scaled, subtract};
 use crate::measure::options::Options;
-use crate::measure::solver::active_set_qp::LONGEST_PROGRAM_STEP;
 use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::step_acceleration::{Correction, Last, Series, across, along};
+use crate::measure::solver::tangent_newton::{LONGEST_STEP, PATIENCE, SETTLED, WORTH_A_BRACKET};
 use crate::polynomial::{NumberJet, Scalar, Simd, WithSimd};
 use bracket::{Metric, ROOM};
 use nalgebra::Vector3;
@@ -151,28 +151,6 @@ impl LevelLost {
     }
 }
 
-/// Most evaluations before another method takes over.
-const MAX_ROUNDS: u32 = 8;
-
-/// Evaluations after which an answer to follow should be near: the start from nothing takes few
-/// more.
-const PATIENCE: u32 = 2;
-
-/// Most evaluations from a cold start before another method takes over.
-pub(in crate::measure) const SEEK_ROUNDS: u32 = 20;
-
-/// Longest step, relative to the bodies, dimensionless, that changes a bracket no more, so that one
-/// it leaves wide is worth a second one in a better metric.
-///
-/// It changes time only; no test pins it.
-const NEGLIGIBLE_STEP: f64 = 1e-3;
-
-/// Longest step, relative to the bodies, dimensionless, after which only rounding is left.
-///
-/// A larger value ends brackets too wide, a smaller one spends rounds on rounding. Exercised by
-/// `continuation_agrees_with_cold_answers_and_is_short`.
-const SETTLED: f64 = 1e-9;
-
 /// Continuation as vectorized work.
 pub(in crate::measure) struct FollowLevel<'a> {
     pub(in crate::measure) a: &'a Body,
@@ -201,13 +179,14 @@ impl WithSimd for FollowLevel<'_> {
         let gradient = add::<S, f64>(trace.gradient, apply_symmetric::<S, f64>(&trace.hessian, moved));
         let gradient_a = apply_transposed::<S, f64>(&sides.map.both, gradient);
         let delta = scaled::<S, f64>(apply_symmetric::<S, f64>(&trace.response, gradient_a), -1.0);
-        if !(sides.length(simd, trace.z, delta) <= LONGEST_PROGRAM_STEP) {
+        if !(sides.length(simd, trace.z, delta) <= LONGEST_STEP) {
             return Err(LevelLost::after(0));
         }
         let predicted = add::<S, f64>(trace.w, delta);
         let [missed] = trace.drift.expected();
-        let most = MAX_ROUNDS.min(options.max_iterations());
-        let (proven, found) = sides.correct(simd, add::<S, f64>(predicted, missed), PATIENCE, most, options)?;
+        let most = PATIENCE.min(options.max_iterations());
+        // After two evaluations steps should be short: the start from nothing takes few more.
+        let (proven, found) = sides.correct(simd, add::<S, f64>(predicted, missed), 2, most, options)?;
         let mut drift = trace.drift;
         drift.update(simd, [subtract::<S, f64>(found.w, predicted)]);
         *trace = LevelTrace { drift, ..found };
@@ -268,7 +247,8 @@ impl Sides<'_> {
                 let end = add::<S, f64>(w, step.delta);
                 let mut found = self.bracket(simd, &at, &step, &Metric::of_b(self, step.curvature));
                 let mut proven = found.proves(options.accuracy());
-                if !proven && length <= NEGLIGIBLE_STEP {
+                if !proven && length <= WORTH_A_BRACKET {
+                    // So short a step leaves it wide for want of a better metric.
                     found = self.bracket(simd, &at, &step, &self.joint(&at));
                     proven = found.proves(options.accuracy());
                 }
@@ -336,8 +316,8 @@ impl Sides<'_> {
             let Correction { longer, shorter } = found;
             delta = add::<S, f64>(delta, across(simd, tangents, [longer[0] + shorter[0], longer[1] + shorter[1]]));
             let length = self.length(simd, at.z, delta);
-            if length > LONGEST_PROGRAM_STEP {
-                delta = scaled::<S, f64>(delta, LONGEST_PROGRAM_STEP / length);
+            if length > LONGEST_STEP {
+                delta = scaled::<S, f64>(delta, LONGEST_STEP / length);
             }
         }
         series.push(tangents, Last { newton, taken: along(simd, tangents, delta), slope, corrected });

@@ -2,15 +2,12 @@
 //! one constraint of each active. The formulas are those of [`super`].
 
 use crate::body::{Body, ConstraintTrust};
-use crate::measure::frames::pose::Pose;
-use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
+use crate::measure::frames::pose::{Pose, RELATIVE_QUATERNION_ERROR};
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled, times_transposed,
 };
-use crate::measure::solver::active_set_qp::{
-    CENTER, DAMPINGS, LEAST_DAMPING, LONGEST_PROGRAM_STEP, MOST_BENT, SHORT_PROGRAM_STEP,
-};
-use crate::measure::solver::tangent_newton::Relative;
+use crate::measure::solver::active_set_qp::{CENTER, DAMPINGS, LEAST_DAMPING, MOST_BENT};
+use crate::measure::solver::tangent_newton::{LONGEST_STEP, Relative};
 use crate::polynomial::{Number, NumberJet, Polynomial, Simd, gamma};
 
 /// The map from B's normalized coordinates w to A's, with its errors.
@@ -197,21 +194,21 @@ impl<'a> Sides<'a> {
         let (mut delta, mut next) = self.damped(simd, at, &gradient_a, &hessian, 0.0);
         let mut length = self.length(simd, at.z, delta);
         for (i, damping) in DAMPINGS.into_iter().enumerate() {
-            if length <= LONGEST_PROGRAM_STEP {
+            if length <= LONGEST_STEP {
                 return (delta, next);
             }
             (delta, next) = self.damped(simd, at, &gradient_a, &hessian, damping);
             length = self.length(simd, at.z, delta);
-            if i == 0 && length < SHORT_PROGRAM_STEP {
+            if i == 0 && length < 0.5 * LONGEST_STEP {
                 // Along flat sides a step is as long as the damping is little.
-                let damping = damping * (length / SHORT_PROGRAM_STEP).max(LEAST_DAMPING);
+                let damping = damping * (2.0 * length / LONGEST_STEP).max(LEAST_DAMPING);
                 let longer = self.damped(simd, at, &gradient_a, &hessian, damping);
-                if self.length(simd, at.z, longer.0) <= LONGEST_PROGRAM_STEP {
+                if self.length(simd, at.z, longer.0) <= LONGEST_STEP {
                     return longer;
                 }
             }
         }
-        (scaled::<S, f64>(delta, (LONGEST_PROGRAM_STEP / length).min(1.0)), next)
+        (scaled::<S, f64>(delta, (LONGEST_STEP / length).min(1.0)), next)
     }
 
     /// The step with that much of a stiffness, and the multiplier.

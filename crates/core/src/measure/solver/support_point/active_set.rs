@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 
 /// A point within whose displacement a point of the body lies, with the constraints that are active
 /// at it; query frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(in crate::measure) struct SupportPoint {
     pub(in crate::measure) x: Vector3<f64>,
     pub(in crate::measure) active: ActiveSet,
@@ -20,9 +20,6 @@ impl SupportPoint {
     pub(super) fn at((x, active): (Vector3<f64>, usize)) -> Self {
         Self { x, active: 1 << active }
     }
-
-    /// No point at all.
-    pub(in crate::measure) const NONE: Self = Self { x: Vector3::new(f64::NAN, f64::NAN, f64::NAN), active: 0 };
 }
 
 /// Which point of a body is farthest along a direction, query frame.

@@ -15,7 +15,7 @@ use crate::body::Body;
 use crate::measure::frames::vector::{
     V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, rows, scaled,
 };
-use crate::measure::solver::tangent_newton::{Side, TAYLOR_ROUNDING};
+use crate::measure::solver::tangent_newton::{LONGEST_STEP, Side, TAYLOR_ROUNDING};
 use crate::polynomial::{Lanes, MAX_LANES, Number, NumberJet, Simd, Vector, WithSimd};
 use nalgebra::Vector3;
 
@@ -208,16 +208,10 @@ fn step<S: Simd, N: Number<S>>(simd: S, jet: &NumberJet<N>, e: V3<N>) -> (V3<N>,
     let bend = N::splat(simd, 0.5) * dot(dz, apply_symmetric(&jet.hessian, dz));
     // The surface bends away from the tangent plane by as much.
     let dz = add_scaled(dz, -bend / square, g);
-    let short = dot(dz, dz).le(N::splat(simd, LONGEST_SUPPORT_STEP * LONGEST_SUPPORT_STEP));
+    // In normalized coordinates a body has size about 1.
+    let short = dot(dz, dz).le(N::splat(simd, LONGEST_STEP * LONGEST_STEP));
     (dz, N::and(simd, short, N::and(simd, positive.le(along), positive.le(next))))
 }
-
-/// Longest step, in normalized coordinates, where a body has size about 1, for which the
-/// linearization of a support point is valid; dimensionless.
-///
-/// Longer, the point may leave the body's side; shorter, fewer points are found in lanes. What is
-/// not found is left to other methods: `support_points_are_found_alone` counts how many are.
-const LONGEST_SUPPORT_STEP: f64 = 0.5;
 
 #[cfg(test)]
 mod tests {

@@ -23,12 +23,17 @@
 //! Points are given in A's frame from the centre of A's normalization on, metres ("query frame" in
 //! these files); `T` and `n` are the rows of the basis.
 
+mod limits;
 mod plane;
 mod simd_body;
 mod taylor_bounds;
 
 use crate::measure::frames::vector::{M3, V3, apply_symmetric, apply_transposed, dot, scaled};
 use crate::polynomial::{Number, NumberJet, Simd};
+pub(in crate::measure) use limits::{
+    AT_REST_SQUARED, FEATURES, FLATTEST, LONGEST_MOVE, LONGEST_STEP, NEAR, PATIENCE, RETREATS, SEEK_ROUNDS, SETTLED,
+    WORTH_A_BRACKET,
+};
 pub(in crate::measure) use plane::Plane;
 pub(in crate::measure) use simd_body::{Relative, Side};
 pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, Extrapolated, NUDGE, TAYLOR_ROUNDING, bracket};

@@ -1,9 +1,8 @@
 //! Newton's step in lanes; derived in [`super::super::newton`].
 
-use super::super::newton::FEATURES;
 use super::set::{LaneOffset, LaneSet};
 use crate::measure::frames::vector::{V3, add, add_scaled, dot, scaled};
-use crate::measure::solver::tangent_newton::{Plane, SurfaceCurvature, moved};
+use crate::measure::solver::tangent_newton::{FEATURES, Plane, SurfaceCurvature, moved};
 use crate::polynomial::{Simd, Vector};
 
 /// A step and where it leads.
