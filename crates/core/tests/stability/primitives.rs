@@ -7,10 +7,10 @@ use std::cell::Cell;
 use std::fmt::Debug;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use sublevel_core::measure::{
-    Decision, Options, Status, WarmStart, WithinMargin, capsule_nearer_to_half_space_than, capsules_nearer_than,
-    capsules_within_margin, nearer_than, nearer_to_capsule_than, nearer_to_half_space_than, overlap,
-    overlap_of_capsule_with_half_space, overlap_of_capsules, overlap_with_capsule, overlap_with_half_space,
-    within_margin, within_margin_of_capsule,
+    Decision, HalfSpace, Options, Pose, Status, WarmStart, WithinMargin, capsule_nearer_to_half_space_than,
+    capsules_nearer_than, capsules_within_margin, distance_to_half_space, nearer_than, nearer_to_capsule_than,
+    nearer_to_half_space_than, overlap, overlap_of_capsule_with_half_space, overlap_of_capsules, overlap_with_capsule,
+    overlap_with_half_space, within_margin, within_margin_of_capsule,
 };
 use sublevel_testkit::catalogue::derivatives::GAPS;
 use sublevel_testkit::catalogue::limits::LIMITS;
@@ -463,4 +463,36 @@ fn depths_that_are_not_measured_are_not_claimed() {
     let shallow = Pair::new(cube, pose(0.0), limb, pose(1.1), "shallow");
     let (found, truth) = cold(&shallow, "shallow");
     assert!((truth.value() + 0.1).abs() < 1e-15 && found.normal == Some(-Vector3::x()), "{found:?} {truth:?}");
+}
+
+/// Plates that slabs cut, above planes tilted from the slab across x by little: on its face, x at
+/// 0.8, the lowest point is that of `y⁶ + (z / h)⁶ <= 1 - 0.8⁶`, by the norm dual to that, or on
+/// the other slab, z at `0.6 h`.
+#[test]
+fn plates_above_planes_along_their_slabs_are_as_low_as_an_edge() {
+    let room = 1.0 - 0.8_f64.powi(6);
+    let sixth_root = |x: f64| x.powf(1.0 / 6.0);
+    for seed in 0..400 {
+        let mut random = Seeded(77_000 + seed);
+        let half = [1.0, 1e-1, 1e-2, 1e-3][random.index(4)];
+        let plate = sublevel_testkit::bodies::cut(1.0, 1.0, half);
+        let tilt = 10_f64.powf(random.between(-9.0, -3.0));
+        let (b, c) = (tilt * random.signed(), tilt * random.signed() * 0.1);
+        let length = (1.0 + b * b + c * c).sqrt();
+        let [of_y, of_z] = [b, c * half].map(|share: f64| share.abs().powf(1.2));
+        let exact = if sixth_root(room * of_z / (of_y + of_z)) <= 0.6 {
+            -(0.8 + sixth_root(room) * (of_y + of_z).powf(5.0 / 6.0)) / length
+        } else {
+            -(0.8 + 0.6 * half * c.abs() + b.abs() * sixth_root(room - 0.6_f64.powi(6))) / length
+        };
+        let plane = HalfSpace::new(Vector3::new(1.0, b, c) / length, 0.0).unwrap();
+        let mut warm = WarmStart::default();
+        for start in ["cold", "warm"] {
+            let options = Options::default();
+            let found = distance_to_half_space(&plate, &Pose::identity(), &plane, &options, &mut warm);
+            let label = format!("seed {seed}, {start}, half {half}, tilts {b:e} {c:e}: {found:?}, exact {exact}");
+            assert!(found.lower <= exact + 1e-13 && exact - 1e-13 <= found.upper, "{label}");
+            assert_eq!(found.status, Status::Converged, "{label}");
+        }
+    }
 }

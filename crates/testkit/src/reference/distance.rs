@@ -218,9 +218,9 @@ impl<'a> Iterate<'a> {
         for i in 0..3 {
             k[i][i] = big(1.0);
             k[i][3 + i] = big(-1.0);
-            k[i][6 + i] = -&*d;
+            k[i][6 + i] = -d;
             k[i][9] = -&n[i];
-            r[i] = &*d * &n[i] - &x[i] + &y[i];
+            r[i] = d * &n[i] - &x[i] + &y[i];
             k[3 + i][6 + i] = big(1.0);
             k[6 + i][6 + i] = big(1.0);
             for j in 0..3 {

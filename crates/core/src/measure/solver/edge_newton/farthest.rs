@@ -25,6 +25,7 @@ use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
 };
 use crate::measure::options::Options;
+use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::support_point::{Asked, Height};
 use crate::measure::solver::tangent_newton::{AT_REST_SQUARED, LONGEST_MOVE, LONGEST_STEP, Side, TAYLOR_ROUNDING};
 use crate::polynomial::{Simd, WithSimd};
@@ -44,9 +45,18 @@ pub(in crate::measure) struct FarthestOfEdges<'a> {
     pub(in crate::measure) options: &'a Options<'a>,
 }
 
+/// What is known where there is no height as accurate as asked for.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::measure) struct FarthestLost {
+    /// Evaluations.
+    pub(in crate::measure) rounds: u32,
+    /// Where the last of them led, body frame, metres, and what is active there.
+    pub(in crate::measure) end: Option<(Vector3<f64>, ActiveSet)>,
+}
+
 impl WithSimd for FarthestOfEdges<'_> {
-    /// The height as accurate as asked for, or after how many evaluations there is none.
-    type Output = Result<Height, u32>;
+    /// The height as accurate as asked for.
+    type Output = Result<Height, FarthestLost>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
@@ -55,7 +65,10 @@ impl WithSimd for FarthestOfEdges<'_> {
         let side = Side::at_home(simd, body, 0);
         let local = side.localize(simd, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
         let pulled = apply_transposed::<S, f64>(&rows(simd, body.inverse()), n);
-        Search { side, local, n, pulled, asked }.run(simd, known, options)
+        let mut end = None;
+        let found = Search { side, local, n, pulled, asked }.run(simd, known, options, &mut end);
+        let center = &body.normalization().center;
+        found.map_err(|rounds| FarthestLost { rounds, end: end.map(|(x, active)| (center + Vector3::from(x), active)) })
     }
 }
 
@@ -70,9 +83,16 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// Newton's method until the bracket is narrow.
+    /// Newton's method until the bracket is narrow; `end` is where the last step led, with what is
+    /// active there.
     #[inline(always)]
-    fn run<S: Simd>(&self, simd: S, known: Option<Vector3<f64>>, options: &Options<'_>) -> Result<Height, u32> {
+    fn run<S: Simd>(
+        &self,
+        simd: S,
+        known: Option<Vector3<f64>>,
+        options: &Options<'_>,
+        end: &mut Option<(V3<f64>, ActiveSet)>,
+    ) -> Result<Height, u32> {
         let (side, n) = (&self.side, self.n);
         let cell = side.body().outline().cell(simd, n);
         let mut x = match known.map(V3::<f64>::from) {
@@ -98,8 +118,11 @@ impl Search<'_> {
             }
             if square > LONGEST_MOVE * LONGEST_MOVE {
                 x = add_scaled::<S, f64>(x, (LONGEST_STEP / square.sqrt()).min(1.0), step);
+                *end = Some((x, active.set()));
                 continue;
             }
+            let to = add::<S, f64>(x, step);
+            *end = Some((to, active.set()));
             // By how much the surface bends away from its tangent planes, and brackets are about as
             // wide.
             let bend = 0.5 * dot::<S, f64>(step, apply_symmetric::<S, f64>(&linear.hessian, step));
@@ -111,7 +134,7 @@ impl Search<'_> {
                     return Err(rounds);
                 }
             }
-            x = add::<S, f64>(x, step);
+            x = to;
         }
         Err(MAX_ROUNDS)
     }

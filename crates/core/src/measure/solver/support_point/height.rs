@@ -49,7 +49,10 @@ pub(in crate::measure) fn height(
         } else {
             match dispatch(FarthestOfEdges { body, n: *n, known: from, asked, options }) {
                 Ok(height) => return height,
-                Err(rounds) => spent = rounds,
+                Err(lost) => {
+                    known = lost.end.map(|(x, active)| SupportPoint { x, active }).or(known);
+                    spent = lost.rounds;
+                }
             }
         }
     }
