@@ -77,7 +77,8 @@ mod tests {
 
     /// A cylinder that lies within a box, tilted by 1.5e-5: Newton's method for the wall and the
     /// side alone, which have no common normal, ends without a solution. What is stationary is the
-    /// overlap across the side, `0.7 + 0.3 sqrt(1 - a²) + 0.4 a` by the axis' share a of its normal.
+    /// overlap across the side, `0.7 + 0.3 sqrt(1 - a²) + 0.4 a` with a the cosine of the angle
+    /// between its normal and the axis.
     #[test]
     fn equations_that_contradict_each_other_are_not_solved() {
         let (block, rod) = (b(1.5, 1.0, 0.7), cylinder(0.3, 0.4));

@@ -22,8 +22,8 @@ use crate::polynomial::dispatch_lanes;
 /// distances of points.
 ///
 /// Each answer is one of [`distance_to_capsule`] from a cold start in all that is proven of it, and
-/// depends on its own poses only, to the last bit. Bodies of one constraint but balls, and boxes and
-/// cylinders beside capsules with an axis, are solved several poses at a time, which takes a
+/// depends on its own poses only, to the last bit. Bodies of one constraint but balls, and boxes
+/// and cylinders beside capsules with an axis, are solved several poses at a time, which takes a
 /// fraction of the time of as many queries; all others, and poses that do not converge at once such
 /// as those in which the axis meets the body, are solved one by one.
 ///

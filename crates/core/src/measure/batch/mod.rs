@@ -48,9 +48,9 @@ use waiting::{Group, MAX_COARSE, Waiting};
 ///
 /// Each answer is one of [`distance`] from a cold start in all that is proven of it, and depends on
 /// its own pose only, to the last bit. Single bodies of one constraint, and boxes and cylinders
-/// along the axes of their frames, are solved several poses at a time, which takes a fraction of the
-/// time of as many queries, of balls by the projection of their centres; all others, and poses that
-/// do not converge at once such as those in contact, are solved one by one.
+/// along the axes of their frames, are solved several poses at a time, which takes a fraction of
+/// the time of as many queries, of balls by the projection of their centres; all others, and poses
+/// that do not converge at once such as those in contact, are solved one by one.
 ///
 /// # Errors
 /// No poses, or a number of places that is not the number of poses; nothing is computed then.

@@ -207,8 +207,8 @@ struct Beside {
 }
 
 impl Beside {
-    /// Poses of the body and the capsule at this distance of the axis, metres, in exact numbers, and
-    /// the normal from the capsule to the body; both turned by a quarter about z, or not.
+    /// Poses of the body and the capsule at this distance of the axis, metres, in exact numbers,
+    /// and the normal from the capsule to the body; both turned by a quarter about z, or not.
     fn at(&self, distance: f64, is_turned: bool) -> (Pose, Pose, Vector3<f64>) {
         // Rotations are of quaternions normalised exactly.
         let [third, sixth, half] = [3.0_f64, 6.0, 2.0].map(|square| 1.0 / square.sqrt());

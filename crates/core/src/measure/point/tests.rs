@@ -135,8 +135,8 @@ fn turned(p: Vector3<f64>) -> Vector3<f64> {
     Vector3::new(9.0 * p.x - 12.0 * p.y + 20.0 * p.z, 20.0 * p.x + 15.0 * p.y, -12.0 * p.x + 16.0 * p.y + 15.0 * p.z)
 }
 
-/// A body of about 1 cm, the same with a further constraint that does not matter, a point of its surface,
-/// an outward normal there and the length of that.
+/// A body of about 1 cm, the same with a further constraint that does not matter, a point of its
+/// surface, an outward normal there and the length of that.
 type Known = ([Body; 2], Vector3<f64>, Vector3<f64>, f64);
 
 /// Bodies of about 1 cm with points of their surfaces in exact numbers; what the sizes of the

@@ -5,7 +5,7 @@ use super::closed_form::of_shapes;
 use super::report::Answer;
 use crate::body::Body;
 use crate::measure::bounds::duality_bounds::distance_upper;
-use crate::measure::distance::distance;
+use crate::measure::distance::{Distance, distance};
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
@@ -70,11 +70,7 @@ pub(super) fn between(
         }
         best.follow(&warm.hint);
         known = Known::of(&best);
-        known.attain(
-            apart.upper / pair.unit(),
-            pair.world_to_query(&apart.witness_a),
-            pair.world_to_query(&apart.witness_b),
-        );
+        known.attain_distance(&pair, &apart);
     }
     if known.lower < 0.0 && !known.narrow(&best) {
         // Halfway between the deepest points is mostly a common one.
@@ -114,11 +110,7 @@ pub(super) fn between(
             best.options = options;
         }
         known.lower = known.lower.max(-best.depth);
-        known.attain(
-            apart.upper / pair.unit(),
-            pair.world_to_query(&apart.witness_a),
-            pair.world_to_query(&apart.witness_b),
-        );
+        known.attain_distance(&pair, &apart);
     }
     let status = Status::of(known.narrow(&best));
     let unit = pair.unit();
@@ -154,6 +146,12 @@ impl Known {
         if upper < self.upper {
             (self.upper, self.x, self.y) = (upper, x, y);
         }
+    }
+
+    /// Takes the witnesses of a distance, if these are nearer.
+    fn attain_distance(&mut self, pair: &Pair<'_>, apart: &Distance) {
+        let [x, y] = [&apart.witness_a, &apart.witness_b].map(|witness| pair.world_to_query(witness));
+        self.attain(apart.upper / pair.unit(), x, y);
     }
 
     fn narrow(&self, best: &Best<'_>) -> bool {

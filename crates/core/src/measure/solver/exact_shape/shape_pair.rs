@@ -3,11 +3,8 @@
 //! Of a point x of A the half squared distance from B has the gradient `v = x - P x` and the
 //! Hessian `n nᵀ + D T K Tᵀ`, in the terms of [`super::projectable`]: for boxes it is a quadratic
 //! in each region, and Newton's method for its least value over A, by [`Projectable::least`], ends
-//! after as many steps as there are changes of regions. For cylinders it converges quadratically. A
-//! step that leads farther away ends where the distance is least along it, by Newton's method from
-//! its end: the distance is convex, so that its derivative there points back, and the edge or corner
-//! that is nearest from the end bends it. Between nearly parallel sides that finds the edge where
-//! they end.
+//! after as many steps as there are changes of regions. For cylinders it converges quadratically.
+//! Steps that lead farther away are cut: [`share_of_step`].
 //! What proves the answer is the support functions of both: a plane across n separates by `n·t -
 //! h_A(-n) - h_B(n)`, t from the centre of B to that of A. What is off in n across an edge or a
 //! face costs its length, so that n is taken from the normals that the features have.
@@ -19,7 +16,7 @@ use crate::measure::frames::vector::{
 use crate::measure::options::Options;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{ALIGNED, TAYLOR_ROUNDING};
-use crate::polynomial::Scalar;
+use crate::polynomial::{Number, Scalar, Simd};
 
 /// Most steps; boxes take fewer than ten.
 const MAX_STEPS: u32 = 32;
@@ -102,6 +99,24 @@ pub(super) enum Contact {
     Apart(f64),
     /// Neither is proven.
     Open,
+}
+
+/// The share of a step, in B's frame, after which the distance is about the least along it, by
+/// Newton's method from its end, where B is seen at this distance (metres) with the frame and the
+/// curvature of its offset surface. The distance is convex, so that its derivative there points
+/// back, and the edge or corner that is nearest from the end bends it: between nearly parallel
+/// sides that finds the edge where they end.
+#[inline(always)]
+pub(super) fn share_of_step<S: Simd, N: Number<S>>(
+    simd: S,
+    (frame, k, distance): (&M3<N>, [N; 3], N),
+    step: V3<N>,
+) -> N {
+    let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
+    let [u0, u1, u] = apply(frame, step);
+    let bent = u0 * (k[0] * u0 + k[1] * u1) + u1 * (k[1] * u0 + k[2] * u1);
+    let share = one - distance * u / (distance * bent + u * u);
+    share.max(zero).min(one)
 }
 
 impl<A: Projectable, B: Projectable> ShapePair<A, B> {
@@ -196,11 +211,10 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
             if seen.distance <= farthest {
                 return Some((next, seen));
             }
-            let (way, k) = (subtract::<Scalar, f64>(next, from), seen.curvature);
-            let [u0, u1, u] = apply::<Scalar, f64>(&seen.frame, apply::<Scalar, f64>(&self.rotation, way));
-            let bent = u0 * (k[0] * u0 + k[1] * u1) + u1 * (k[1] * u0 + k[2] * u1);
-            let share = 1.0 - seen.distance * u / (seen.distance * bent + u * u);
-            next = add_scaled::<Scalar, f64>(from, share.clamp(0.0, 1.0), way);
+            let way = subtract::<Scalar, f64>(next, from);
+            let placed = apply::<Scalar, f64>(&self.rotation, way);
+            let share = share_of_step(Scalar, (&seen.frame, seen.curvature, seen.distance), placed);
+            next = add_scaled::<Scalar, f64>(from, share, way);
         }
         None
     }

@@ -7,7 +7,7 @@ use super::least::LaneLeast;
 use super::set::{LaneOffset, LaneSet};
 use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, apply, apply_transposed, dot, scaled, subtract};
-use crate::measure::solver::exact_shape::shape_pair::{CROSSED, FINELY_ALIGNED, FLAT, LEVEL, MOST_CUTS};
+use crate::measure::solver::exact_shape::shape_pair::{CROSSED, FINELY_ALIGNED, FLAT, LEVEL, MOST_CUTS, share_of_step};
 use crate::measure::solver::tangent_newton::TAYLOR_ROUNDING;
 use crate::polynomial::{Number, Simd, Vector, gamma};
 use nalgebra::Vector3;
@@ -147,13 +147,10 @@ impl<A: LaneLeast, B: LaneSet, N: Copy> LanePair<A, B, N> {
     where
         N: Number<S>,
     {
-        let (zero, one) = (N::splat(simd, 0.0), N::splat(simd, 1.0));
         let seen = self.b.offset(simd, self.placed(to));
-        let (way, k) = (subtract(to, from), seen.curvature);
-        let [u0, u1, u] = apply(&seen.frame, apply(&self.rotation, way));
-        let bent = u0 * (k[0] * u0 + k[1] * u1) + u1 * (k[1] * u0 + k[2] * u1);
-        let share = one - seen.distance * u / seen.distance.mul_add(bent, u * u);
-        add_scaled(from, share.max(zero).min(one), way)
+        let way = subtract(to, from);
+        let share = share_of_step(simd, (&seen.frame, seen.curvature, seen.distance), apply(&self.rotation, way));
+        add_scaled(from, share, way)
     }
 
     /// A point of A's frame in B's.
