@@ -15,8 +15,9 @@
 use crate::body::MAX_CONSTRAINTS;
 use crate::measure::frames::query_frame::Posed;
 use crate::measure::solver::active_constraints::MAX_ACTIVE;
+use crate::measure::solver::equality_program;
 use crate::measure::solver::kkt_newton::Active;
-use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
+use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::tangent_newton::LONGEST_STEP;
 use crate::polynomial::Jet;
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
@@ -314,23 +315,10 @@ impl Quadratic {
 
     /// Solves the equations of optimality with the active constraints, which get their multipliers.
     fn equations(&self, active: &mut Working) -> Option<Vector4<f64>> {
-        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        let size = VARIABLES + active.len;
-        for i in 0..VARIABLES {
-            (0..VARIABLES).for_each(|j| m[i][j] = self.hessian[(i, j)]);
-            m[i][size] = -self.cost[i];
-        }
-        for (k, &index) in active.index().iter().enumerate() {
-            let (gradient, room) = self.row(index);
-            for i in 0..VARIABLES {
-                m[i][VARIABLES + k] = gradient[i];
-                m[VARIABLES + k][i] = gradient[i];
-            }
-            m[VARIABLES + k][size] = *room;
-        }
-        let solution = solve(&mut m, size)?;
-        active.multiplier[..active.len].copy_from_slice(&solution[VARIABLES..size]);
-        Some(Vector4::from_row_slice(&solution[..VARIABLES]))
+        let rows = active.index().iter().map(|&index| *self.row(index));
+        let (v, multipliers) = equality_program::minimize(&self.hessian, &self.cost, rows, solve)?;
+        active.multiplier[..active.len].copy_from_slice(&multipliers[..active.len]);
+        Some(v)
     }
 }
 

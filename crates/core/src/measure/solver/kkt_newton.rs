@@ -16,6 +16,7 @@ use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::frames::vector::V3;
 use crate::measure::solver::active_constraints::{ActiveConstraints, ActiveSet, MAX_ACTIVE};
+use crate::measure::solver::kkt_system::{Curved, DistanceSystem, Residuals};
 use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::step_acceleration::{Series, Taken, across, along, tangents};
 use crate::measure::solver::tangent_newton::{ALIGNED, LONGEST_MOVE, PATIENCE, SEEK_ROUNDS, WORTH_A_BRACKET};
@@ -170,6 +171,11 @@ impl Active {
         self.multiplier.swap(k, self.len);
     }
 
+    /// Adds a share of steps to the multipliers.
+    fn add(&mut self, steps: &[f64; MAX_ACTIVE], share: f64) {
+        self.multiplier[..self.len].iter_mut().zip(steps).for_each(|(multiplier, step)| *multiplier += step * share);
+    }
+
     /// Least-squares multipliers of `Σ λ_i ∇g_i = target` at v. False if the gradients are
     /// dependent.
     pub(in crate::measure) fn fit(&mut self, body: &Posed<'_>, v: &Vector3<f64>, target: &Vector3<f64>) -> bool {
@@ -180,7 +186,7 @@ impl Active {
             for j in 0..self.len {
                 system[i][j] = gradients[i].dot(&gradients[j]);
             }
-            system[i][self.len] = gradients[i].dot(target);
+            system[i][MAX_ACTIVE] = gradients[i].dot(target);
         }
         let Some(solution) = solve(&mut system, self.len) else { return false };
         self.multiplier[..self.len].copy_from_slice(&solution[..self.len]);
@@ -238,6 +244,11 @@ impl At {
             at.hessian += jet.hessian * multiplier;
         }
         at
+    }
+
+    /// What Newton's matrix is made of, of so many active constraints.
+    pub(in crate::measure) fn curved(&self, len: usize) -> Curved<'_> {
+        Curved { gradients: &self.gradient[..len], hessian: &self.hessian }
     }
 }
 
@@ -408,77 +419,36 @@ impl DistanceNewton {
     }
 
     /// One Newton step; its length relative to the bodies, or none if the system is singular.
-    ///
-    /// The second of the equations at the head of this file gives `dn = -(n + u) - H_A dx - G_A
-    /// dλ`, G the gradients and H the weighted Hessians, and the first then `dy = (I + D H_A) dx -
-    /// n dD + D G_A dλ + (x - y + D u)`, which leaves dx, dD and the multipliers.
     fn step(&mut self, pair: &Pair<'_>, (a, b): &(At, At), series: &mut Series) -> Option<f64> {
-        let (la, lb, distance, n) = (self.a.len, self.b.len, self.distance, self.n);
-        let size = 4 + la + lb;
-        // Four unknowns, three constraints of each body, a right-hand side.
-        let mut m = [[0.0; 12]; 10];
-        let offset = self.x - self.y + a.sum * distance;
-        let moved = Matrix3::identity() + a.hessian * distance;
-        // u + w = 0.
-        let (by_x, by_distance) = (a.hessian + b.hessian * moved, -b.hessian * n);
-        let residual = -(a.sum + b.sum);
-        let right = residual - b.hessian * offset;
-        let free = tangents(&a.gradient[..la], &b.gradient[..lb]);
+        let (curved_a, curved_b) = (a.curved(self.a.len), b.curved(self.b.len));
+        let balance = a.sum + b.sum;
+        let free = tangents(curved_a.gradients, curved_b.gradients);
         // Where a corrected step has led there may be no curvature at all.
-        let stiff = free.filter(|_| series.is_corrected()).map_or(0.0, |free| Self::stiffness(pair, free, &residual));
-        for i in 0..3 {
-            for j in 0..3 {
-                m[i][j] = by_x[(i, j)];
-            }
-            m[i][i] += stiff;
-            m[i][3] = by_distance[i];
-            m[i][size] = right[i];
-        }
-        for (k, gradient) in a.gradient[..la].iter().enumerate() {
-            let column = gradient + b.hessian * gradient * distance;
-            (0..3).for_each(|i| m[i][4 + k] = column[i]);
-        }
-        for (k, gradient) in b.gradient[..lb].iter().enumerate() {
-            (0..3).for_each(|i| m[i][4 + la + k] = gradient[i]);
-        }
-        // |n| = 1.
-        let turned = a.hessian * n;
-        (0..3).for_each(|j| m[3][j] = turned[j]);
-        (0..la).for_each(|k| m[3][4 + k] = n.dot(&a.gradient[k]));
-        m[3][size] = 0.5 * (n.norm_squared() - 1.0) - n.dot(&(n + a.sum));
-        // g = 1 and h = 1.
-        for (row, (gradient, value)) in m[4..].iter_mut().zip(a.gradient[..la].iter().zip(&a.value)) {
-            row[..3].copy_from_slice(gradient.as_slice());
-            row[size] = 1.0 - value;
-        }
-        for (row, (gradient, value)) in m[4 + la..].iter_mut().zip(b.gradient[..lb].iter().zip(&b.value)) {
-            row[..3].copy_from_slice(moved.tr_mul(gradient).as_slice());
-            row[3] = -gradient.dot(&n);
-            (0..la).for_each(|k| row[4 + k] = distance * gradient.dot(&a.gradient[k]));
-            row[size] = 1.0 - value - gradient.dot(&offset);
-        }
-        let d = solve(&mut m, size)?;
-        let dx = Vector3::new(d[0], d[1], d[2]);
-        let of_a: Vector3<f64> = (0..la).map(|k| a.gradient[k] * d[4 + k]).sum();
-        let dy = moved * dx - n * d[3] + of_a * distance + offset;
-        // Of corners that stay where they are the normal turns.
-        let dn = -(n + a.sum) - a.hessian * dx - of_a;
+        let stiff = free.filter(|_| series.is_corrected());
+        let stiffness = stiff.map_or(0.0, |free| Self::stiffness(pair, free, &balance));
+        let system = DistanceSystem { a: curved_a, b: curved_b, distance: self.distance, n: self.n, stiffness };
+        let residuals = Residuals {
+            offset: self.x - self.y + a.sum * self.distance,
+            normal: self.n + a.sum,
+            balance,
+            length: 0.5 * (self.n.norm_squared() - 1.0),
+            of_a: a.value.map(|value| value - 1.0),
+            of_b: b.value.map(|value| value - 1.0),
+        };
+        let step = system.step(&residuals, solve)?;
         let bent = a.hessian + b.hessian;
         // A longer step leaves where the linearization means anything.
-        let Taken { more, share: damping, length } = series.take(free, &dx, (&residual, &bent), LONGEST_MOVE, |more| {
-            pair.a.relative_length(&(dx + more)).max(pair.b.relative_length(&(dy + more)))
-        });
-        let (dx, dy, dn) = (dx + more, dy + more, dn - a.hessian * more);
-        self.x += dx * damping;
-        self.y += dy * damping;
+        let Taken { more, share: damping, length } =
+            series.take(free, &step.x, (&-balance, &bent), LONGEST_MOVE, |more| {
+                pair.a.relative_length(&(step.x + more)).max(pair.b.relative_length(&(step.y + more)))
+            });
+        let dn = step.n - a.hessian * more;
+        self.x += (step.x + more) * damping;
+        self.y += (step.y + more) * damping;
         self.n += dn * damping;
-        self.distance += d[3] * damping;
-        for k in 0..la {
-            self.a.multiplier[k] += d[4 + k] * damping;
-        }
-        for k in 0..lb {
-            self.b.multiplier[k] += d[4 + la + k] * damping;
-        }
+        self.distance += step.distance * damping;
+        self.a.add(&step.of_a, damping);
+        self.b.add(&step.of_b, damping);
         Some(length.max(dn.norm()))
     }
 }

@@ -2,7 +2,8 @@
 //!
 //! Continuation from the answer before (`continuation`, with `predictor`, `tangent_newton`,
 //! `step_acceleration` on a `two_point_problem`), guesses (`initial_guess`, `support_table_gjk`),
-//! Newton's method with active sets (`edge_newton`, `kkt_newton`, `active_set_qp`), interior points
+//! Newton's method with active sets (`edge_newton`, `kkt_newton` on the `kkt_system`,
+//! `active_set_qp` on `equality_program`s), interior points
 //! (`barrier_programs`), and refinement in double-double arithmetic (`refinement`,
 //! `double_double`).
 
@@ -15,9 +16,11 @@ pub(super) mod convex_root_bracket;
 pub(super) mod depth;
 pub(super) mod double_double;
 pub(super) mod edge_newton;
+pub(super) mod equality_program;
 pub(super) mod exact_shape;
 pub(super) mod initial_guess;
 pub(super) mod kkt_newton;
+pub(super) mod kkt_system;
 pub(super) mod level_continuation;
 pub(super) mod level_newton;
 pub(super) mod linear_systems;

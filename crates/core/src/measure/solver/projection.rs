@@ -23,7 +23,8 @@ use crate::measure::bounds::duality_bounds::Multipliers;
 use crate::measure::frames::pose::{Pose, ROTATION_ERROR};
 use crate::measure::frames::query_frame::Posed;
 use crate::measure::solver::active_constraints::{ActiveSet, MAX_ACTIVE};
-use crate::measure::solver::linear_systems::{Augmented, MAX_UNKNOWNS, solve};
+use crate::measure::solver::equality_program;
+use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::optimize::{Program, Row, Rows, minimise};
 use crate::polynomial::{Jet, gamma};
@@ -365,30 +366,14 @@ impl Steps<'_> {
         hessian: &Matrix3<f64>,
         aim: &Vector3<f64>,
     ) -> Option<(Vector3<f64>, Multipliers)> {
-        let mut m: Augmented = [[0.0; MAX_UNKNOWNS + 1]; MAX_UNKNOWNS];
-        let size = 3 + self.active.count_ones() as usize;
         let active = (0..jets.len()).filter(|i| self.active >> i & 1 == 1);
-        for (k, i) in active.clone().enumerate() {
-            // Multipliers of unit gradients: rows and columns of one size.
-            let scale = 1.0 / jets[i].gradient.norm();
-            for axis in 0..3 {
-                m[axis][3 + k] = jets[i].gradient[axis] * scale;
-                m[3 + k][axis] = jets[i].gradient[axis] * scale;
-            }
-            m[3 + k][size] = (1.0 - jets[i].value) * scale;
-        }
-        for row in 0..3 {
-            for column in 0..3 {
-                m[row][column] = hessian[(row, column)];
-            }
-            m[row][size] = aim[row];
-        }
-        let solution = solve(&mut m, size)?;
+        let length = |i: usize| jets[i].gradient.norm();
+        // Multipliers of unit gradients: rows and columns of one size.
+        let rows = active.clone().map(|i| (jets[i].gradient / length(i), (1.0 - jets[i].value) / length(i)));
+        let (d, found) = equality_program::minimize(hessian, &-aim, rows, solve)?;
         let mut multipliers = [0.0; MAX_CONSTRAINTS];
-        for (k, i) in active.enumerate() {
-            multipliers[i] = solution[3 + k] / jets[i].gradient.norm();
-        }
-        Some((Vector3::new(solution[0], solution[1], solution[2]), multipliers))
+        active.zip(found).for_each(|(i, multiplier)| multipliers[i] = multiplier / length(i));
+        Some((d, multipliers))
     }
 }
 

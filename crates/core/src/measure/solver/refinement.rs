@@ -10,7 +10,6 @@
 mod axis;
 mod body;
 mod pair;
-mod systems;
 
 pub(in crate::measure) use axis::{Refined, RefinedAxis, RefinedOffset};
 pub(in crate::measure) use pair::RefinedPair;

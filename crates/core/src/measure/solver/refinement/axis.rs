@@ -20,13 +20,14 @@
 //! more, Newton's method has to go on.
 
 use super::body::{MAX_REVISED, NEGLIGIBLE, RefinedActive, RefinedBody, identity, rotation};
-use super::systems::{axis_matrix, equilibrated};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
 use crate::measure::solver::double_double::{
     Two, Twos, UNIT, apply, dot, doubles, minus, plus, times, transposed, twos,
 };
+use crate::measure::solver::equality_program;
 use crate::measure::solver::kkt_newton::{Active, VIOLATED};
+use crate::measure::solver::linear_systems::solve_equilibrated;
 use crate::measure::solver::projection::Single;
 use crate::measure::solver::tangent_newton::ALIGNED;
 use nalgebra::{Matrix3, Vector3};
@@ -157,24 +158,19 @@ impl<'a> RefinedAxis<'a> {
     /// One Newton step; its length in query units, or none if the system is singular.
     fn step(&self, x: &mut Twos, active: &mut RefinedActive) -> Option<f64> {
         let (at, sum, values) = self.body.at(active, x);
-        let (len, size) = (active.set.len, 3 + active.set.len);
         let place = self.place(x).double();
         let mut hessian = Matrix3::identity() + at.hessian;
         if let Some(along) = self.along.filter(|_| place.abs() < 1.0) {
             hessian -= along * along.transpose();
         }
-        let mut m = axis_matrix(&hessian, &at, len);
-        let rest = minus(&self.pull(x), &sum);
-        (0..3).for_each(|i| m[i][size] = rest[i].double());
-        for (k, value) in values[..len].iter().enumerate() {
-            m[3 + k][size] = (Two::from(1.0) - *value).double();
-        }
-        let step = equilibrated(&mut m, size)?;
-        let dx = Vector3::from_row_slice(&step[..3]);
+        let rest = minus(&sum, &self.pull(x));
+        let rows = at.gradient.iter().zip(&values).take(active.set.len);
+        let rows = rows.map(|(gradient, value)| (*gradient, (Two::from(1.0) - *value).double()));
+        let (dx, steps) = equality_program::minimize(&hessian, &doubles(&rest), rows, solve_equilibrated)?;
         let length = dx.norm();
         let damping = (0.5 * self.body.posed.radius / length).min(1.0);
         *x = plus(x, &twos(&(dx * damping)));
-        active.add(&step[3..size], damping);
+        active.add(&steps[..active.set.len], damping);
         Some(length)
     }
 

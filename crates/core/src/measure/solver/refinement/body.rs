@@ -188,7 +188,6 @@ impl<'a> RefinedBody<'a> {
             sum = plus(&sum, &times(&jet.gradient, multiplier));
             values[k] = jet.value;
         }
-        at.sum = doubles(&sum);
         (at, sum, values)
     }
 }
@@ -225,8 +224,8 @@ impl RefinedActive {
         carrying.map(|((length, _), value)| (Two::from(1.0) - *value).double().abs() / length).fold(0.0, f64::max)
     }
 
-    /// Drops constraints as [`Active::drop_negative`] does and takes one that is violated by more than
-    /// `excess`; whether any.
+    /// Drops constraints as [`Active::drop_negative`] does and takes one that is violated by more
+    /// than `excess`; whether any.
     pub(super) fn revise(&mut self, body: &RefinedBody<'_>, v: &Twos, level: f64, excess: f64) -> bool {
         let mut set = self.set;
         let over = |i: usize| (body.jet(i, v).value - Two::from(level)).double();

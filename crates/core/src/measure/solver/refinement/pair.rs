@@ -1,13 +1,15 @@
 //! The distance and the level distance of two bodies in double-double arithmetic.
 
 use super::body::{MAX_REVISED, NEGLIGIBLE, RefinedActive, RefinedBody, identity, rotation};
-use super::systems::{distance_matrix, equilibrated, level_matrix};
 use crate::measure::frames::query_frame::{Pair, Posed};
 use crate::measure::solver::double_double::{
     Two, Twos, UNIT, apply, dot, doubles, minus, plus, product, times, transposed, twos,
 };
+use crate::measure::solver::equality_program;
 use crate::measure::solver::kkt_newton::{Active, DistanceNewton, VIOLATED};
+use crate::measure::solver::kkt_system::{DistanceSystem, Residuals};
 use crate::measure::solver::level_newton::LevelNewton;
+use crate::measure::solver::linear_systems::solve_equilibrated;
 use crate::measure::solver::tangent_newton::ALIGNED;
 use nalgebra::Vector3;
 
@@ -73,38 +75,43 @@ impl<'a> RefinedPair<'a> {
         limit: u32,
         mut accept: impl FnMut(&RefinedDistance) -> bool,
     ) -> u32 {
-        let (mut x, mut y, mut d) = (twos(&start.x), twos(&start.y), Two::from(start.distance));
+        let (mut x, mut y) = (twos(&start.x), twos(&start.y));
+        let (mut n, mut d) = (twos(&start.n), Two::from(start.distance));
         let (mut of_a, mut of_b) = (RefinedActive::new(&start.a), RefinedActive::new(&start.b));
         let mut revised = 0;
         for step in 1..=MAX_STEPS.min(limit) {
             let (a, sum_a, values_a) = self.a.at(&of_a, &x);
             let (b, sum_b, values_b) = self.b.at(&of_b, &y);
-            let (la, lb) = (of_a.set.len, of_b.set.len);
-            let size = 7 + la + lb;
-            let mut m = distance_matrix(d.double(), &a, &b, la, lb);
             let offset = plus(&minus(&x, &y), &times(&sum_a, d));
-            let balance = plus(&sum_a, &sum_b);
-            for i in 0..3 {
-                m[i][size] = -offset[i].double();
-                m[3 + i][size] = -balance[i].double();
-            }
-            m[6][size] = 0.5 * (Two::from(1.0) - dot(&sum_a, &sum_a)).double();
-            for (k, value) in values_a[..la].iter().chain(&values_b[..lb]).enumerate() {
-                m[7 + k][size] = (Two::from(1.0) - *value).double();
-            }
-            let Some(step_) = equilibrated(&mut m, size) else {
+            let excess = |value: Two| (value - Two::from(1.0)).double();
+            let system = DistanceSystem {
+                a: a.curved(of_a.set.len),
+                b: b.curved(of_b.set.len),
+                distance: d.double(),
+                n: doubles(&n),
+                stiffness: 0.0,
+            };
+            let residuals = Residuals {
+                offset: doubles(&offset),
+                normal: doubles(&plus(&n, &sum_a)),
+                balance: doubles(&plus(&sum_a, &sum_b)),
+                length: 0.5 * excess(dot(&n, &n)),
+                of_a: values_a.map(excess),
+                of_b: values_b.map(excess),
+            };
+            let Some(newton) = system.step(&residuals, solve_equilibrated) else {
                 // Where both are flat the point at hand may do.
                 accept(&self.distance_bracket(&x, &y, &of_a, &of_b));
                 return step;
             };
-            let (dx, dy) = (Vector3::from_row_slice(&step_[..3]), Vector3::from_row_slice(&step_[3..6]));
-            let length = dx.norm().max(dy.norm());
+            let length = newton.x.norm().max(newton.y.norm());
             let damping = (0.5 * self.small / length).min(1.0);
-            x = plus(&x, &twos(&(dx * damping)));
-            y = plus(&y, &twos(&(dy * damping)));
-            d += Two::from(step_[6] * damping);
-            of_a.add(&step_[7..7 + la], damping);
-            of_b.add(&step_[7 + la..size], damping);
+            x = plus(&x, &twos(&(newton.x * damping)));
+            y = plus(&y, &twos(&(newton.y * damping)));
+            n = plus(&n, &twos(&(newton.n * damping)));
+            d += Two::from(newton.distance * damping);
+            of_a.add(&newton.of_a[..of_a.set.len], damping);
+            of_b.add(&newton.of_b[..of_b.set.len], damping);
             if length < 1e-6 * self.small || step % 4 == 0 {
                 let common = if d.is_positive() { None } else { self.common(&x, &y, &of_a, &of_b) };
                 if accept(&common.unwrap_or_else(|| self.distance_bracket(&x, &y, &of_a, &of_b))) {
@@ -178,31 +185,28 @@ impl<'a> RefinedPair<'a> {
             let (a, sum_a, values_a) = self.a.at(&of_a, &x);
             let (b, sum_b, values_b) = self.b.at(&of_b, &x);
             let (la, lb) = (of_a.set.len, of_b.set.len);
-            let size = 4 + la + lb;
-            let mut m = level_matrix(&a, &b, la, lb);
             let balance = plus(&sum_a, &sum_b);
-            for i in 0..3 {
-                m[i][size] = -balance[i].double();
-            }
             let total = of_a.multiplier[..la].iter().fold(Two::ZERO, |sum, multiplier| sum + *multiplier);
-            m[3][size] = (Two::from(1.0) - total).double();
-            for (k, value) in values_a[..la].iter().enumerate() {
-                m[4 + k][size] = (s - *value).double();
-            }
-            for (k, value) in values_b[..lb].iter().enumerate() {
-                m[4 + la + k][size] = (Two::from(1.0) - *value).double();
-            }
-            let Some(step_) = equilibrated(&mut m, size) else {
+            let cost = doubles(&balance).push((Two::from(1.0) - total).double());
+            // Of x and s.
+            let row = |gradient: &Vector3<f64>, by_s: f64, residual: Two| (gradient.push(by_s), -residual.double());
+            let rows_a = a.gradient[..la].iter().zip(values_a).map(|(gradient, value)| row(gradient, -1.0, value - s));
+            let rows_b = b.gradient[..lb].iter().zip(values_b);
+            let rows_b = rows_b.map(|(gradient, value)| row(gradient, 0.0, value - Two::from(1.0)));
+            let hessian = (a.hessian + b.hessian).fixed_resize(0.0);
+            let Some((dv, steps)) =
+                equality_program::minimize(&hessian, &cost, rows_a.chain(rows_b), solve_equilibrated)
+            else {
                 accept(&self.level_bracket(&x, &of_a, &of_b));
                 return step;
             };
-            let dx = Vector3::from_row_slice(&step_[..3]);
+            let dx = dv.xyz();
             let length = dx.norm();
             let damping = (0.5 * self.small / length).min(1.0);
             x = plus(&x, &twos(&(dx * damping)));
-            s += Two::from(step_[3] * damping);
-            of_a.add(&step_[4..4 + la], damping);
-            of_b.add(&step_[4 + la..size], damping);
+            s += Two::from(dv.w * damping);
+            of_a.add(&steps[..la], damping);
+            of_b.add(&steps[la..la + lb], damping);
             if length < 1e-6 * self.small || step % 4 == 0 {
                 if accept(&self.level_bracket(&x, &of_a, &of_b)) {
                     return step;
