@@ -140,7 +140,7 @@ mod tests {
     fn steps_solve_the_linearized_equations() {
         for seed in 0..1800 {
             let mut random = Seeded(seed);
-            // Curvatures, gradients and residuals of bodies that thin, of residuals of this size.
+            // Of thin bodies curvatures are larger by the inverse square of this.
             let thin = if seed % 2 == 0 { 1.0 } else { 1e-4 };
             let mut vector = || Vector3::from_fn(|_, _| random.signed());
             let mut bent = || {
