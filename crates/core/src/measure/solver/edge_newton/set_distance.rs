@@ -184,11 +184,6 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
             }
             _ => self.seek(simd, center),
         };
-        // Where its tables reach the set a body is hardly apart from it, if at all: with an active
-        // set for each of them Newton's method takes half the steps. An axis has no such set.
-        if first.is_none() && self.set.thinnest() > 0.0 && runs(Stage::Edges) {
-            return Err(rounds);
-        }
         if let Some(at) = first {
             match self.run(simd, at, &mut rounds) {
                 Ok(proven) => return Ok(proven),
