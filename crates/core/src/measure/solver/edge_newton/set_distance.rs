@@ -39,6 +39,9 @@ use crate::measure::solver::tangent_newton::{
 use crate::polynomial::{Simd, WithSimd};
 use nalgebra::Vector3;
 
+/// Gap where the last start is not tried, in parts of the body's reach: [`Stage::Edges`] answers.
+const NO_LAST_START: f64 = 0.05;
+
 /// What is kept of an answer for the next query of the pair.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::measure) struct EdgeShapeTrace {
@@ -201,7 +204,13 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         evaluated.fill(simd, &self.side, y);
         let highest = evaluated.highest();
         let x = self.side.with_active(highest).on_the_surface(simd, y, evaluated.jets[highest].value);
-        self.run(simd, self.untried(simd, x), &mut rounds).map_err(|_| rounds)
+        let at = self.untried(simd, x);
+        // An active set for each of the two takes half the steps near contact. An axis has none.
+        let near = NO_LAST_START * self.side.body().trust().reach;
+        if self.set.thinnest() > 0.0 && at.seen.distance < near && runs(Stage::Edges) {
+            return Err(rounds);
+        }
+        self.run(simd, at, &mut rounds).map_err(|_| rounds)
     }
 
     /// From the poses alone; none where tables overshoot the set, as where the body reaches it.
