@@ -20,7 +20,7 @@ use nalgebra::{Matrix3, Vector3};
 // What is lost is about as large as what is proven, and there is no allocation in a solve.
 #[allow(clippy::result_large_err)]
 pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<Distance, Lost> {
-    let Query { of_a: (a, pose_a), of_b: (b, pose_b), goal, options } = *query;
+    let Query { of_a: (a, pose_a), of_b: (b, pose_b), goal, options, .. } = *query;
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
     let trace = if let Hint::Edges(trace) = &warm.hint { Some(trace) } else { None };
     let start = start((a, pose_a), pose_b, &warm.hint);

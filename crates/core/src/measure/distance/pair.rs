@@ -4,7 +4,7 @@
 use super::answer::Distance;
 use super::edges::of_edges;
 use super::exact::{Exact, of_shapes};
-use super::planes::lower_by_planes;
+use super::planes::planes_between;
 use super::query::Query;
 use super::search::Search;
 use crate::body::{Body, ClosedForm};
@@ -52,12 +52,13 @@ pub(in crate::measure) fn settle(
     if goal.met(bound.lower, bound.upper) {
         return bound;
     }
-    let query = Query { of_a, of_b, goal, options };
+    let mut query = Query { of_a, of_b, goal, options, facing: None };
     if let Some(found) = query.still_overlapping(warm) {
         return found;
     }
     if runs(Stage::Planes) {
-        bound.lower = bound.lower.max(lower_by_planes(of_a, of_b, &warm.hint, goal));
+        let planes = planes_between(of_a, of_b, &warm.hint, goal);
+        (bound.lower, query.facing) = (bound.lower.max(planes.lower), planes.facing);
         if goal.met(bound.lower, bound.upper) {
             return bound;
         }
@@ -103,7 +104,7 @@ pub(in crate::measure) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> Distance {
-    Query { of_a, of_b, goal, options }.solve(warm)
+    Query { of_a, of_b, goal, options, facing: None }.solve(warm)
 }
 
 // Each method hands on to the next where it fails, and none hands back: an answer is written where
@@ -149,7 +150,7 @@ impl<'a> Query<'a> {
 
     /// Of bodies of which at least one has several constraints, and at most one a closed form.
     fn of_edges(&self, warm: &mut WarmStart) -> Distance {
-        let Self { of_a, of_b, goal, options } = *self;
+        let Self { of_a, of_b, goal, options, .. } = *self;
         let mut spent = 0;
         // Near contact two active sets find common points sooner.
         if runs(Stage::ClosedForm)
@@ -174,7 +175,7 @@ impl<'a> Query<'a> {
     fn relation(&self) -> Apart<'a> {
         let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
         let tolerance = self.options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-        Apart { pose_a, pose_b, goal: self.goal, tolerance }
+        Apart { pose_a, pose_b, goal: self.goal, tolerance, facing: self.facing }
     }
 
     fn pair(&self) -> Pair<'a> {

@@ -94,6 +94,9 @@ pub(in crate::measure) struct Apart<'a> {
     pub(in crate::measure) goal: &'a StopCriterion,
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
+    /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that
+    /// stand for the bodies.
+    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 impl Relation for Apart<'_> {
@@ -104,7 +107,8 @@ impl Relation for Apart<'_> {
 
     #[inline(always)]
     fn start<S: Simd>(&self, simd: S, a: &Body, b: &Body, relative: &Relative<f64>) -> (Start<f64>, [f64; 2]) {
-        meeting(simd, a, b, relative, facing(simd, a, b, relative), None)
+        let n = self.facing.unwrap_or_else(|| facing(simd, a, b, relative));
+        meeting(simd, a, b, relative, n, None)
     }
 
     #[inline(always)]

@@ -320,7 +320,8 @@ impl<'a> Search<'a> {
             return;
         }
         let (pose_a, pose_b) = pair.poses();
-        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance: self.tolerance * pair.unit() };
+        let tolerance = self.tolerance * pair.unit();
+        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance, facing: None };
         let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
         match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {

@@ -121,7 +121,7 @@ impl WithSimd for EdgeQuery<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start } = self;
-        let relation = Apart { pose_a, pose_b, goal, tolerance };
+        let relation = Apart { pose_a, pose_b, goal, tolerance, facing: None };
         let relative = relation.relative(simd, a, b);
         let sides = (Side::at_home(simd, a, 0), Side::away(simd, b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };
