@@ -258,8 +258,9 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
         self.b.separation(Scalar, n, (self.translation, self.a.height(Scalar, own)))
     }
 
+    /// Bound of the error of the distance of a point of B's frame from either set, metres.
     #[inline(always)]
-    fn rounding(&self, x: V3<f64>) -> f64 {
+    pub(super) fn rounding(&self, x: V3<f64>) -> f64 {
         let size = x[0].abs() + x[1].abs() + x[2].abs() + 2.0 * (self.a.reach() + self.b.reach());
         TAYLOR_ROUNDING * size + self.displacement
     }

@@ -214,11 +214,13 @@ impl Problem<'_> {
         if is_met {
             return Ok(self.apart(&found, &rotation, (radius_a, radius_b)));
         }
+        // Small sets are met where rounding alone exceeds their tolerance.
+        let may_be_met = found.upper <= self.tolerance.max(2.0 * pair.rounding(found.x));
+        // How deep radii reach beyond that is not known.
+        if may_be_met && let (Contact::Common(point), _) = pair.contact(pair.own(found.x), self.options) {
+            return Ok(met(point, [f64::NEG_INFINITY, -radius], found.steps));
+        }
         if found.upper <= self.tolerance {
-            // How deep radii reach beyond that is not known.
-            if let (Contact::Common(point), _) = pair.contact(pair.own(found.x), self.options) {
-                return Ok(met(point, [f64::NEG_INFINITY, -radius], found.steps));
-            }
             // Segments have no inside to be deep in.
             let flat = pair.a.thinnest() == 0.0 && pair.b.thinnest() == 0.0;
             if flat || radius > 0.0 {
