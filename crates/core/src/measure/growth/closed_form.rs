@@ -9,7 +9,7 @@ use crate::measure::solver::exact_shape::growth_of_shapes;
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 
-/// The answer with its hint, of balls and boxes that grow about their centres; none of others, and
+/// The answer with its hint, of balls, boxes and cylinders that grow about their centres; none
 /// where the bracket is not as narrow as asked for.
 pub(super) fn of_shapes(
     (a, pose_a): At<'_, Body>,

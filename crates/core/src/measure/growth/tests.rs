@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::body::Body;
+use crate::measure::overlap::{Decision, overlap};
 use crate::measure::tests::{at, powers, random_pose, zoo};
 use crate::measure::warm::Hint;
 use nalgebra::Vector3;
@@ -270,6 +271,59 @@ fn limits_are_kept_and_admitted() {
         assert_eq!(answer.status, Status::BracketWide);
         assert!(answer.upper - answer.lower <= 1e-9 * answer.upper.max(1.0), "{answer:?}");
     }
+}
+
+/// Boxes and cylinders that are grown by less than the answer are apart and by more overlap, and
+/// the general search, which is asked by a center of growth that is not quite the middle, agrees.
+#[test]
+fn cylinders_grow_as_the_general_search_says() {
+    let (mut by_planes, count) = (0, 600);
+    for seed in 0..count {
+        let mut random = Seeded(77_000 + seed);
+        let mut size = || 10_f64.powf(0.7 * random.signed());
+        let (ha, hb) = (Vector3::from_fn(|_, _| size()), Vector3::from_fn(|_, _| size()));
+        let make = |half: &Vector3<f64>, is_box: bool, grown: f64| {
+            let half = half * grown;
+            if is_box { Body::cuboid("box", half) } else { Body::cylinder("can", half.x, half.z) }.unwrap()
+        };
+        let is_box = seed % 2 == 0;
+        let (a, b) = (make(&ha, is_box, 1.0), make(&hb, false, 1.0));
+        let far = (ha.norm() + hb.norm()) * 10_f64.powf(random.signed());
+        let mut pose_b = random_pose(&mut random, 0.0);
+        let mut pose_a = random_pose(&mut random, 0.0);
+        match seed % 5 {
+            // With parallel axes, and at right angles.
+            0 => pose_a = Pose::identity().with_translation(*pose_a.translation()),
+            1 => {
+                pose_a = Pose::identity();
+                pose_b = Pose::from_quaternion(Vector3::zeros(), [0.5_f64.sqrt(), 0.0, 0.0, 0.5_f64.sqrt()]).unwrap();
+            }
+            _ => {}
+        }
+        if seed % 10 == 0 {
+            pose_b = Pose::identity();
+        }
+        pose_b = pose_b.with_translation(pose_a.translation() + random.unit() * far);
+        let answer = cold(&a, &pose_a, &b, &pose_b);
+        let label = format!("seed {seed}: {ha:?} {hb:?} {pose_a:?} {pose_b:?} {answer:?}");
+        assert_eq!(answer.status, Status::Converged, "{label}");
+        let nearby = a.clone().with_growth_center(Vector3::new(1e-200, 0.0, 0.0)).unwrap();
+        let general = cold(&nearby, &pose_a, &b, &pose_b);
+        assert!(general.lower <= answer.upper && answer.lower <= general.upper, "{label} {general:?}");
+        if general.status == Status::Converged && !(general.tied || answer.tied) {
+            let apart = (general.normal.unwrap() - answer.normal.unwrap()).norm();
+            assert!(apart < 1e-4, "{label} {general:?}");
+        }
+        by_planes += u32::from(answer.iterations != general.iterations);
+        for (factor, expected) in [(1.0 - 1e-8, Decision::No), (1.0 + 1e-8, Decision::Yes)] {
+            let grown = |half, is_box| make(half, is_box, answer.upper * factor);
+            let options = Options::default();
+            let found =
+                overlap(&grown(&ha, is_box), &pose_a, &grown(&hb, false), &pose_b, &options, &mut WarmStart::default());
+            assert_eq!(found, expected, "{label} grown by {factor}");
+        }
+    }
+    assert!(u64::from(by_planes) > count / 2, "{by_planes}");
 }
 
 #[test]

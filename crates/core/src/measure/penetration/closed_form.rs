@@ -11,8 +11,8 @@ use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 use nalgebra::Vector3;
 
-/// The answer with its hint, of balls, boxes and cylinders; none of two cylinders at an angle, and
-/// where the bracket is not as narrow as asked for.
+/// The answer with its hint, of balls, boxes and cylinders; none where the bracket is not as narrow
+/// as asked for.
 pub(super) fn of_shapes(
     (a, pose_a): At<'_, Body>,
     (b, pose_b): At<'_, Body>,

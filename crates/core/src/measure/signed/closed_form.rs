@@ -11,8 +11,8 @@ use crate::measure::solver::exact_shape::{SignedShapes, signed_of_shapes};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 
-/// The answer with its hint; the iterations spent for other bodies, for overlaps of two cylinders
-/// at an angle, and where the bracket is not as narrow as asked for.
+/// The answer with its hint; the iterations spent for other bodies, and where the bracket is not as
+/// narrow as asked for.
 pub(super) fn of_shapes(
     (a, pose_a): At<'_, Body>,
     (b, pose_b): At<'_, Body>,

@@ -69,14 +69,14 @@ struct Facings {
 }
 
 /// An arc of an ellipse; lengths in metres.
-struct EllipseArc {
-    radius: f64,
+pub(super) struct EllipseArc {
+    pub(super) radius: f64,
     /// Ratio of the semi-axes.
-    zeta: f64,
+    pub(super) zeta: f64,
     /// From the centre of the ellipse to the point, along its major and minor semi-axis.
-    w: [f64; 2],
+    pub(super) w: [f64; 2],
     /// Normals `(u, 1)` at the ends.
-    ends: [f64; 2],
+    pub(super) ends: [f64; 2],
 }
 
 /// A box and a cylinder, which is seen from the box.
@@ -278,7 +278,7 @@ fn is_beyond(point: [f64; 2], from: [f64; 2], to: [f64; 2], limit: f64) -> bool 
 impl EllipseArc {
     /// Where the overlap is least on it, as the slope u, and a lower bound of that, metres; none
     /// where it is least at an end. g counts as 0 from the tolerance on, metres.
-    fn least(&self, tolerance: f64) -> Option<(f64, f64)> {
+    pub(super) fn least(&self, tolerance: f64) -> Option<(f64, f64)> {
         let Self { radius, zeta, w: [x, y], ends } = *self;
         let (x, [from, to]) = if x < 0.0 { (-x, [-ends[1], -ends[0]]) } else { (x, ends) };
         let bent = radius * (1.0 - zeta) * (1.0 + zeta);

@@ -3,6 +3,7 @@
 
 mod along_body;
 mod beside;
+mod crossed_cylinders;
 mod cuboid;
 mod cuboid_axes;
 mod cylinder;

@@ -1,12 +1,14 @@
 //! The signed distance of two bodies with closed forms where they stand: of balls and others, and
-//! of boxes and cylinders that overlap, but for two cylinders at an angle.
+//! of boxes and cylinders that overlap.
 //!
 //! A ball is a point that others are larger by a radius for, and so is a cylinder beside a parallel
 //! one. What takes boxes apart soonest is one of 15 axes ([`super::cuboid_axes`]), a box and a
-//! cylinder one of finitely many directions ([`super::cylinder_axes`]); the points that come out
-//! last are those that face each other once the shapes are apart along it, however far.
+//! cylinder one of finitely many directions ([`super::cylinder_axes`]), two cylinders at an angle
+//! one that branch and bound finds ([`super::crossed_cylinders`]); the points that come out last
+//! are those that face each other once the shapes are apart along it, however far.
 
 use super::beside::{Beside, beside};
+use super::crossed_cylinders::CrossedCylinders;
 use super::cuboid_axes::{ALIGNED, CuboidAxes, LeastOverlap};
 use super::cylinder_axes::CuboidCylinder;
 use super::placed::{direction_to_world, to_world};
@@ -64,9 +66,9 @@ fn swapped(found: SignedShapes) -> SignedShapes {
 }
 
 /// The signed distance of a ball and another shape, or of boxes and cylinders unless they are
-/// apart; none of two cylinders at an angle, and of shapes that face each other along none of the
-/// directions as far as is known. Directions at an angle with a cosine below `elsewhere` are
-/// others. From a point of A on, world frame.
+/// apart; none of shapes that face each other along none of the directions as far as is known.
+/// Directions at an angle with a cosine below `elsewhere` are others. From a point of A on, world
+/// frame.
 pub(in crate::measure) fn signed_of_shapes(
     of_a: Placed<'_>,
     of_b: Placed<'_>,
@@ -95,12 +97,8 @@ pub(in crate::measure) fn signed_of_shapes(
             ExactShape::Cylinder { radius_m: radius_a, half_height_m: height_a, .. },
             ExactShape::Cylinder { radius_m: radius_b, half_height_m: height_b, .. },
         ) => {
-            let sum = ExactShape::Cylinder {
-                radius_m: radius_a + radius_b,
-                half_height_m: height_a + height_b,
-                wall_and_caps: [0, 1],
-            };
-            of_parallel_cylinders(of_a, of_b, sum, elsewhere, options)
+            let sizes = [[radius_b, radius_a], [height_b, height_a]];
+            of_cylinders(of_a, of_b, sizes, elsewhere, options)
         }
         _ => of_cuboids(of_a, of_b, elsewhere, (start, options)),
     }
@@ -162,27 +160,37 @@ fn of_cuboid_and_cylinder(
     least.taken_from_support(cuboid, cylinder, options)
 }
 
-/// Of two cylinders along the same direction: their difference is a cylinder, too, of the summed
-/// sizes.
-fn of_parallel_cylinders(
+/// Of two cylinders, by the radii and half heights of B and A: along the same direction, their
+/// difference is a cylinder, too, of the summed sizes.
+fn of_cylinders(
     of_a: Placed<'_>,
     of_b: Placed<'_>,
-    sum: ExactShape,
+    sizes: [[f64; 2]; 2],
     elsewhere: f64,
     options: &Options<'_>,
 ) -> Option<SignedShapes> {
     let Seen { rotation, between, turned, displacement } = Seen::from(of_a, of_b);
-    let tilt = rotation[(0, 2)].hypot(rotation[(1, 2)]);
-    if tilt > PARALLEL {
-        return None;
-    }
-    let found = beside(&sum, between.into(), elsewhere);
-    let reach = of_a.0.reach_m() + of_b.0.reach_m() + between.norm();
-    let error = displacement + (turned + tilt + gamma(64)) * reach;
-    let (lower, upper) = (-found.upper - error, -found.lower + error);
-    let least = LeastOverlap { lower, upper, n: found.n, elsewhere: found.elsewhere };
-    let normal = direction_to_world(of_b.0, of_b.1, found.n);
-    let least = LeastTranslation { normal, least, error, is_decided: true, is_aligned: error <= ALIGNED * found.arm };
+    let axis: Vector3<f64> = rotation.column(2).into();
+    let tilt = axis.x.hypot(axis.y);
+    let [radii, half_heights] = sizes;
+    let (least, error, is_aligned) = if tilt > PARALLEL {
+        let pair = CrossedCylinders::new(sizes, (axis, between), (turned, displacement));
+        (pair.least_overlap(elsewhere)?, pair.error(), true)
+    } else {
+        let sum = ExactShape::Cylinder {
+            radius_m: radii.iter().sum(),
+            half_height_m: half_heights.iter().sum(),
+            wall_and_caps: [0, 1],
+        };
+        let found = beside(&sum, between.into(), elsewhere);
+        let reach = of_a.0.reach_m() + of_b.0.reach_m() + between.norm();
+        let error = displacement + (turned + tilt + gamma(64)) * reach;
+        let (lower, upper) = (-found.upper - error, -found.lower + error);
+        let least = LeastOverlap { lower, upper, n: found.n, elsewhere: found.elsewhere };
+        (least, error, error <= ALIGNED * found.arm)
+    };
+    let normal = direction_to_world(of_b.0, of_b.1, least.n);
+    let least = LeastTranslation { normal, least, error, is_decided: true, is_aligned };
     least.taken_from_support(of_a, of_b, options)
 }
 
