@@ -314,5 +314,9 @@ impl Race {
         let fronts = [(Timing::Warm, "with a hint"), (Timing::Cold, "without")]
             .map(|(timing, how)| format!("{how} {}", pareto(&entries(self, Truth::Hulls, timing))));
         let _ = writeln!(text, "\nPareto front against hulls: {}.", fronts.join(". The same "));
+        let ours: Vec<Entry> =
+            entries(self, Truth::Hulls, Timing::Cold).into_iter().filter(|entry| entry.ours).collect();
+        let names: Vec<&str> = front(ours.iter()).iter().map(|entry| entry.name.as_str()).collect();
+        let _ = writeln!(text, "\nOf ours alone, without a hint: {}.", names.join("; "));
     }
 }

@@ -409,7 +409,17 @@ impl<'a> Projection<'a> {
             return Ok(Projected { lower, upper, plane: normal, normal, witness, nearest: *point, iterations: rounds });
         }
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
-        let query = ExactQuery { body, pose, form: &form, form_pose: &form_pose, goal, tolerance, options, trace };
+        let query = ExactQuery {
+            body,
+            pose,
+            form: &form,
+            form_pose: &form_pose,
+            goal,
+            tolerance,
+            options,
+            trace,
+            facing: None,
+        };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
         if found.upper == 0.0 {
             *warm = WarmStart::default();

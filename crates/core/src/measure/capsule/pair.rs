@@ -3,7 +3,7 @@
 
 use super::answer::CapsuleDistance;
 use super::axes::{Axis, of_axes};
-use super::bounds::early_bounds;
+use super::bounds::{EarlyBounds, early_bounds};
 use super::shape::Capsule;
 use crate::body::{Body, ClosedForm};
 use crate::measure::bounds::culling::{CULLING_SLACK, across};
@@ -71,20 +71,21 @@ struct SeenAxis {
 impl Problem<'_> {
     pub(super) fn solve(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
         let known = if self.goal.is_narrow() {
-            [f64::NEG_INFINITY, f64::INFINITY]
+            EarlyBounds::NONE
         } else {
             early_bounds(of_body, (self.capsule, self.capsule_pose), &self.goal)
         };
-        let found = if self.goal.met(known[0], known[1]) {
+        let found = if self.goal.met(known.lower, known.upper) {
             CapsuleDistance { upper: f64::INFINITY, ..self.met(of_body.1.translation(), 0) }
         } else {
-            self.search(of_body, warm)
+            self.search(of_body, known.facing, warm)
         };
-        CapsuleDistance { lower: found.lower.max(known[0]), upper: found.upper.min(known[1]), ..found }
+        CapsuleDistance { lower: found.lower.max(known.lower), upper: found.upper.min(known.upper), ..found }
     }
 
-    fn search(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> CapsuleDistance {
-        match self.by_newton(of_body, warm) {
+    /// Beyond what is known early: from the normal of a plane between them, if one was tried.
+    fn search(&self, of_body: At<'_, Body>, facing: Option<Vector3<f64>>, warm: &mut WarmStart) -> CapsuleDistance {
+        match self.by_newton(of_body, facing, warm) {
             Ok(found) => self.refined(of_body, found),
             Err(spent) => self.beyond_newton(of_body, spent, warm),
         }
@@ -150,7 +151,12 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many iterations nothing is proven, or nothing as narrow.
-    fn by_newton(&self, of_body: At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+    fn by_newton(
+        &self,
+        of_body: At<'_, Body>,
+        facing: Option<Vector3<f64>>,
+        warm: &mut WarmStart,
+    ) -> Result<CapsuleDistance, u32> {
         if !runs(Stage::ClosedForm) {
             Err(0)
         } else if let Some(form) = of_body.0.closed_form() {
@@ -162,7 +168,7 @@ impl Problem<'_> {
                 None => self.of_shape((form, of_body.1), warm),
             }
         } else if of_body.0.is_smooth() {
-            self.of_smooth(of_body, warm)
+            self.of_smooth(of_body, facing, warm)
         } else {
             self.of_edged(of_body, warm)
         }
@@ -172,12 +178,18 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// After how many evaluations nothing is proven.
-    fn of_smooth(&self, (body, pose): At<'_, Body>, warm: &mut WarmStart) -> Result<CapsuleDistance, u32> {
+    fn of_smooth(
+        &self,
+        (body, pose): At<'_, Body>,
+        facing: Option<Vector3<f64>>,
+        warm: &mut WarmStart,
+    ) -> Result<CapsuleDistance, u32> {
         let Self { tolerance, options, .. } = *self;
         let form_pose = self.capsule_pose;
         let (form, goal) = (self.capsule.closed_form(), self.goal.beyond_radius(self.capsule.radius_m()));
         let trace = if let Hint::Exact(trace) = &warm.hint { Some(trace) } else { None };
-        let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace };
+        let facing = facing.map(|n| form_pose.rotation().inverse_transform_vector(&n).into());
+        let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace, facing };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
         if found.upper == 0.0 {
             *warm = WarmStart::default();

@@ -88,7 +88,7 @@ impl<'a> Exact<'a> {
             }
             _ => None,
         };
-        match dispatch(ExactQuery { body, pose, form, form_pose, goal, tolerance, options, trace }) {
+        match dispatch(ExactQuery { body, pose, form, form_pose, goal, tolerance, options, trace, facing: None }) {
             Ok(found) => Ok((self.answer(&found, tolerance), self.hint(&found))),
             Err(ExactLost { rounds, about }) => {
                 Err((rounds, about.map_or_else(WarmStart::default, |about| self.general_hint(&about))))

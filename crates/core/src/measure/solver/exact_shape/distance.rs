@@ -12,7 +12,7 @@ use super::level::{Level, LevelProblem};
 use super::newton::newton;
 use super::projectable::{Offset, Projectable};
 use super::separating_plane::{SeparatingPlane, separating_plane};
-use super::start::start;
+use super::start::{on_the_table, start};
 use crate::body::Body;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
@@ -73,6 +73,8 @@ pub(in crate::measure) struct ExactPair<'a, P> {
     pub(in crate::measure) options: &'a Options<'a>,
     /// Of the answer before.
     pub(in crate::measure) trace: Option<&'a ExactTrace>,
+    /// About the unit normal of a plane between both, from the set to the body.
+    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 /// A proven bracket, metres, and where it is attained, in the frame of the set.
@@ -167,7 +169,10 @@ impl<P: Projectable> ExactPair<'_, P> {
         if !(seen.distance > 0.0) {
             return None;
         }
-        let (x, n) = start(simd, &self.set, self.body, &self.relative, seen.frame[2]);
+        let (x, n) = match self.facing {
+            Some(n) => on_the_table(simd, &self.set, self.body, &self.relative, n),
+            None => start(simd, &self.set, self.body, &self.relative, seen.frame[2]),
+        };
         let seen = self.set.offset(simd, x);
         let overshot = !(seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0);
         if !overshot || self.options.exhausted(*rounds) {

@@ -41,9 +41,10 @@ pub(in crate::measure) struct GrowthOfShapes {
 /// How far outside of the sum the nearest points are taken, relative to the smaller shape,
 /// dimensionless.
 ///
-/// Larger, Newton's method only gains this factor at each step; smaller, rounding turns normals:
-/// they have to be known to 1e-7. Exercised by `cylinders_grow_as_the_general_search_says`.
-const OUTSIDE: f64 = 1e-6;
+/// Larger, Newton's method only gains this factor at each step; smaller, the rounding of short
+/// distances turns normals, which have to be known to 1e-7, and one pair in ten is left to the
+/// general search. Exercised by `cylinders_grow_as_the_general_search_says`.
+const OUTSIDE: f64 = 1e-2;
 
 /// Most planes that are tried; half of all pairs take four.
 ///

@@ -31,6 +31,9 @@ pub(in crate::measure) struct ExactQuery<'a> {
     pub(in crate::measure) options: &'a Options<'a>,
     /// Of the answer before.
     pub(in crate::measure) trace: Option<&'a ExactTrace>,
+    /// About the unit normal of a plane between both, from the shape to the body, in the frame of the
+    /// shape.
+    pub(in crate::measure) facing: Option<V3<f64>>,
 }
 
 impl WithSimd for ExactQuery<'_> {
@@ -57,9 +60,9 @@ impl WithSimd for ExactQuery<'_> {
 impl<'a> ExactQuery<'a> {
     #[inline(always)]
     fn pair<P>(self, relative: Relative<f64>, set: P) -> ExactPair<'a, P> {
-        let Self { body, form, goal, tolerance, options, trace, .. } = self;
+        let Self { body, form, goal, tolerance, options, trace, facing, .. } = self;
         let displacement = form.displacement_m();
-        ExactPair { body, relative, set, displacement, goal, tolerance, options, trace }
+        ExactPair { body, relative, set, displacement, goal, tolerance, options, trace, facing }
     }
 }
 

@@ -80,7 +80,7 @@ pub(in crate::measure) fn start<S: Simd, P: Projectable>(
 /// The same on the support table, from a direction on; of a thin body the nearest point that was
 /// seen.
 #[inline(always)]
-fn on_the_table<S: Simd, P: Projectable>(
+pub(super) fn on_the_table<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     body: &Body,
