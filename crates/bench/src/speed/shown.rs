@@ -153,7 +153,26 @@ impl Shown {
         let _ = writeln!(text, "\n{verdict}");
         let pareto = pareto(&as_entries(&means(&self.races)));
         let _ = writeln!(text, "\nPareto front of the means over all pairs, with a hint, against hulls: {pareto}.");
+        let (count, ours) = (self.races.len(), self.on_our_fronts());
+        let _ =
+            writeln!(text, "\nOn how many of the {count} fronts of ours alone, without a hint, against hulls: {ours}.");
         text
+    }
+
+    /// Ours that none of ours as accurate is faster than, with the number of pairs.
+    fn on_our_fronts(&self) -> String {
+        let mut counts: Vec<(String, usize)> = Vec::new();
+        for race in &self.races {
+            let all = entries(race, Truth::Hulls, Timing::Cold);
+            for entry in front(all.iter().filter(|entry| entry.ours)) {
+                match counts.iter_mut().find(|(name, _)| *name == entry.name) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((entry.name.clone(), 1)),
+                }
+            }
+        }
+        counts.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        counts.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join("; ")
     }
 
     /// How many times as fast as the fastest peer of equal or better accuracy.
@@ -314,9 +333,5 @@ impl Race {
         let fronts = [(Timing::Warm, "with a hint"), (Timing::Cold, "without")]
             .map(|(timing, how)| format!("{how} {}", pareto(&entries(self, Truth::Hulls, timing))));
         let _ = writeln!(text, "\nPareto front against hulls: {}.", fronts.join(". The same "));
-        let ours: Vec<Entry> =
-            entries(self, Truth::Hulls, Timing::Cold).into_iter().filter(|entry| entry.ours).collect();
-        let names: Vec<&str> = front(ours.iter()).iter().map(|entry| entry.name.as_str()).collect();
-        let _ = writeln!(text, "\nOf ours alone, without a hint: {}.", names.join("; "));
     }
 }
