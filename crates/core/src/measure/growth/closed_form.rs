@@ -9,30 +9,30 @@ use crate::measure::solver::exact_shape::growth_of_shapes;
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
 
-/// The answer with its hint, of balls, boxes and cylinders that grow about their centres; none
-/// where the bracket is not as narrow as asked for.
+/// The answer with its hint, of balls, boxes and cylinders that grow about their centres; the
+/// iterations spent for other bodies, and where the bracket is not as narrow as asked for.
 pub(super) fn of_shapes(
     (a, pose_a): At<'_, Body>,
     (b, pose_b): At<'_, Body>,
     options: &Options<'_>,
     warm: &mut WarmStart,
-) -> Option<GrowthDistance> {
-    let (form_a, form_b) = (a.closed_form()?, b.closed_form()?);
+) -> Result<GrowthDistance, u32> {
+    let (Some(form_a), Some(form_b)) = (a.closed_form(), b.closed_form()) else { return Err(0) };
     let about = |body: &Body, form: &ClosedForm| body.growth_ball().center == *form.center();
     if !(about(a, form_a) && about(b, form_b)) {
-        return None;
+        return Err(0);
     }
     let start = if let Hint::Shapes { x_a } = &warm.hint { Some(pose_a.transform_point(x_a)) } else { None };
     let radii = [a.growth_ball().radius, b.growth_ball().radius];
     let found = growth_of_shapes((form_a, pose_a), (form_b, pose_b), radii, start.as_ref(), options)?;
     let (lower, upper, normal, witness) = (found.lower, found.upper, found.normal, found.witness);
     if !(upper - lower <= options.accuracy() * upper.max(1.0)) {
-        return None;
+        return Err(found.steps);
     }
     *warm = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.of_a) }.into();
     // Against the vector from A's centre to B's.
     let slope = normal / found.width;
-    Some(GrowthDistance {
+    Ok(GrowthDistance {
         status: Status::Converged,
         lower,
         upper,

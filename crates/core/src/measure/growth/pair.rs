@@ -32,11 +32,24 @@ pub(super) fn between(
     options: &Options<'_>,
     warm: &mut WarmStart,
 ) -> GrowthDistance {
-    if runs(Stage::ClosedForm)
-        && let Some(found) = of_shapes((a, pose_a), (b, pose_b), options, warm)
-    {
-        return found;
+    let mut spent = 0;
+    if runs(Stage::ClosedForm) {
+        match of_shapes((a, pose_a), (b, pose_b), options, warm) {
+            Ok(found) => return found,
+            Err(steps) => spent = steps,
+        }
     }
+    let found = by_search((a, pose_a), (b, pose_b), &options.after(spent), warm);
+    GrowthDistance { iterations: found.iterations + spent, ..found }
+}
+
+/// Of bodies of any kind.
+fn by_search(
+    (a, pose_a): At<'_, Body>,
+    (b, pose_b): At<'_, Body>,
+    options: &Options<'_>,
+    warm: &mut WarmStart,
+) -> GrowthDistance {
     let along = Along::new(a, pose_a, b, pose_b, options.accuracy());
     let mut spent = 0;
     if let Hint::Smooth(trace) = &mut warm.hint

@@ -326,6 +326,54 @@ fn cylinders_grow_as_the_general_search_says() {
     assert!(u64::from(by_planes) > count / 2, "{by_planes}");
 }
 
+/// Cylinders far from the origins of their frames: what rounds there counts.
+#[test]
+fn cylinders_far_in_their_frames_keep_their_brackets_in_order() {
+    let mut converged = 0;
+    for seed in 0..600 {
+        let mut random = Seeded(78_000 + seed);
+        let mut size = || 0.3 * 10_f64.powf(random.positive());
+        let sizes = [(); 4].map(|()| size());
+        let far = 10_f64.powf(2.0 + 2.5 * random.positive());
+        let [a, b] = [0, 2].map(|i| {
+            let can = Body::cylinder("can", sizes[i], sizes[i + 1]).unwrap();
+            can.moved(&nalgebra::UnitQuaternion::identity(), &(random.unit() * far)).unwrap()
+        });
+        let (mut pose_a, pose_b) = (random_pose(&mut random, far), random_pose(&mut random, 0.0));
+        let apart = random.unit() * 10_f64.powf(4.0 * random.positive());
+        let middle = pose_b.transform_point(&b.growth_ball().center);
+        pose_a = pose_a.with_translation(middle + apart - pose_a.transform_direction(&a.growth_ball().center));
+        let answer = cold(&a, &pose_a, &b, &pose_b);
+        assert!(answer.lower <= answer.upper, "seed {seed}: {answer:?}");
+        converged += u32::from(answer.status == Status::Converged);
+    }
+    assert!(converged > 100, "{converged}");
+}
+
+/// A rod along the edge of a box: their sum has a corner rounded by the rod's radius, which the ray
+/// leaves where a quadratic says.
+#[test]
+fn thin_rods_grow_along_the_right_normal() {
+    let cube = Body::cuboid("box", Vector3::repeat(1.0)).unwrap();
+    let along_y = [-(0.5_f64.sqrt()), 0.0, 0.0, 0.5_f64.sqrt()];
+    for radius in [1e-1_f64, 1e-2, 1e-3, 1e-4, 1e-5] {
+        let rod = Body::cylinder("rod", radius, 1.0).unwrap();
+        for bent in [0.0, 1e-6, 1e-5, 1e-3, 0.1, 0.5].map(|share| share * radius) {
+            let ray = Vector3::new(1.0 + bent * 0.5_f64.sqrt(), 0.0, 1.0 - bent * 0.5_f64.sqrt());
+            let place = ray * 2.0 + Vector3::y() * 0.6;
+            let answer = cold(&cube, &Pose::identity(), &rod, &Pose::from_quaternion(place, along_y).unwrap());
+            let label = format!("radius {radius:e} bent {bent:e}: {answer:?}");
+            assert_eq!(answer.status, Status::Converged, "{label}");
+            // |λ ray - (1, 1)| = radius, the far root: λ = 1 + μ.
+            let off = ray - Vector3::new(1.0, 0.0, 1.0);
+            let (p, q, r) = (ray.norm_squared(), ray.dot(&off), off.norm_squared() - radius * radius);
+            let mu = (-q + (q * q - p * r).sqrt()) / p;
+            let normal = (off + ray * mu) / radius;
+            assert!((answer.normal.unwrap() + normal).norm() < 3e-7, "{label} against {normal:?}");
+        }
+    }
+}
+
 #[test]
 fn nearly_parallel_sides_show_their_edges() {
     let cuboid = |x, y, z| Body::cuboid("box", Vector3::new(x, y, z)).unwrap();

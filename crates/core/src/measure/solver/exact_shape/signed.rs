@@ -25,7 +25,8 @@ use nalgebra::{Matrix3, Vector3};
 /// Sine of the angle between the axes of two cylinders up to which they count as parallel.
 ///
 /// The bracket is wider by this times their sizes: larger, that is more than asked for; smaller,
-/// cylinders whose poses were rounded to as much are left to the general search. Exercised by
+/// cylinders whose poses were rounded to as much have no normal across both to 1e-7, and are left
+/// to the general search. Exercised by
 /// `parallel_cylinders_overlap_as_one_does`.
 const PARALLEL: f64 = 1e-10;
 

@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 /// more, what comes to nothing takes longer than that.
 const MOST_TRIANGLES: u32 = 2048;
 
-/// Most triangles that wait: each halving leaves one.
+/// Most triangles that wait: each halving leaves one, and a side is halved no more than 30 times.
 const MOST_WAITING: usize = 64;
 
 /// Unit vectors along the edges of a cone of directions.
@@ -48,10 +48,11 @@ impl CrossedCylinders {
         let mut waiting = self.all_directions()?;
         let (mut lower, mut least) = (f64::INFINITY, f64::INFINITY);
         for _ in 0..MOST_TRIANGLES {
-            let limit = candidates.best().direction.overlap.min(least) - self.error;
-            if limit + 2.0 * self.error < 0.0 {
+            let known = candidates.best().direction.overlap.min(least);
+            if known + self.error < 0.0 {
                 return None;
             }
+            let limit = known - self.error;
             let Some(triangle) = waiting.pop() else { return Some(lower) };
             if self.is_symmetric_to_less(&triangle) {
                 continue;
@@ -74,6 +75,7 @@ impl CrossedCylinders {
             if direction.overlap < limit {
                 least = direction.overlap;
                 if direction.overlap + self.error < 0.0 {
+                    // Whatever kind of place it is, they are apart.
                     candidates.push(self, direction, Place::Rims);
                 } else if let Some(rims) = self.newton(direction) {
                     candidates.push(self, rims, Place::Rims);

@@ -18,14 +18,20 @@
 
 use super::CrossedCylinders;
 use super::direction::{Angle, Direction, HERE, ON_AXIS, tangents};
+use crate::measure::solver::exact_shape::cuboid_axes::ALIGNED;
 use crate::measure::solver::exact_shape::cylinder_axes::EllipseArc;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 
 /// Most candidates: nine that are known beforehand, and rims.
+///
+/// Fewer, rims are dropped, and the pair may be left to the general search; more are never found.
 const MOST_CANDIDATES: usize = 24;
 
 /// Most steps of Newton's method.
+///
+/// Fewer, rims near an axis are not found, whose curvature changes fast; more are in vain. It
+/// changes time only.
 const MOST_STEPS: u32 = 12;
 
 /// Length of a step of Newton's method, radians, after which the direction is known to rounding.
@@ -143,16 +149,26 @@ impl Candidates {
         &self.all[self.best]
     }
 
-    /// How far places have to be off for the normal of the best to be off by a radian, metres.
-    pub(super) fn best_arm(&self, pair: &CrossedCylinders) -> f64 {
-        let Candidate { direction, place, .. } = self.best();
-        match *place {
-            Place::Axis(_) => f64::INFINITY,
-            // Axes are off by an angle, and what is across both by that over the sine of theirs.
-            Place::Pole => pair.sine * pair.reach,
-            Place::Circle(i) => pair.form_on_circle(direction, i, HERE)[0] - direction.overlap,
-            Place::Rims => pair.curvature(direction, HERE) - direction.overlap,
-        }
+    /// Takes for the best, of those that overlap by as much but for rounding and are not elsewhere,
+    /// the one with the fewest kinks: beside a kink that f falls from, it falls by less than
+    /// rounding, and the normals differ.
+    pub(super) fn choose(&mut self, pair: &CrossedCylinders, elsewhere: f64) {
+        let best = self.best().direction;
+        let kinks = |candidate: &Candidate| match candidate.place {
+            Place::Rims => 0,
+            Place::Circle(_) => 1,
+            Place::Axis(_) | Place::Pole => 2,
+        };
+        let as_good = |candidate: &Candidate| {
+            let Direction { n, overlap, .. } = candidate.direction;
+            overlap <= best.overlap + pair.error && n.dot(&best.n) > elsewhere
+        };
+        let all = (0..self.count).filter(|&i| as_good(&self.all[i]));
+        let chosen = all.min_by(|&i, &j| {
+            let [p, q] = [&self.all[i], &self.all[j]];
+            kinks(p).cmp(&kinks(q)).then(p.direction.overlap.total_cmp(&q.direction.overlap))
+        });
+        self.best = chosen.unwrap_or(self.best);
     }
 
     /// A lower bound of f, metres, in a cone of directions that is in the cap of a candidate.
@@ -204,14 +220,14 @@ impl CrossedCylinders {
         let direction = &candidate.direction;
         let step = match candidate.place {
             Place::Axis(i) => {
-                let slope = direction.gradient.norm();
-                (slope > self.radii[i]).then(|| direction.gradient * (-BESIDE_AXIS / slope))
+                let slope = self.smooth_at_axis(direction, i);
+                (slope.norm() > self.radii[i]).then(|| slope * (-BESIDE_AXIS / slope.norm()))
             }
             Place::Circle(i) => {
-                let slope = self.slope_across(direction, i);
-                let falls = slope.abs() - self.half_heights[i];
+                let falls = -self.least_slope(direction, candidate.place);
                 let [.., bent] = self.form_on_circle(direction, i, HERE);
                 let angle = (falls / (bent - direction.overlap).max(falls)).min(0.25);
+                let slope = self.slope_across(direction, i);
                 (falls > 0.0).then(|| self.axes[i] * -angle.copysign(slope))
             }
             Place::Pole | Place::Rims => None,
@@ -223,27 +239,13 @@ impl CrossedCylinders {
     pub(super) fn cap(&self, direction: &Direction, place: Place) -> Option<Cap> {
         let lower = direction.overlap;
         match place {
-            Place::Axis(i) => {
-                // Of what has no kink there, and of kinks the subgradient that is least steep.
-                let (j, mut smooth) = (1 - i, direction.gradient);
-                if direction.cosines[j].abs() <= ON_AXIS {
-                    let (axis, half) = (&self.axes[j], self.half_heights[j]);
-                    smooth -= axis * half.copysign(direction.cosines[j]);
-                    smooth -= axis * smooth.dot(axis).clamp(-half, half);
-                }
-                by_slope(self.radii[i] - smooth.norm(), lower).map(|cosine| Cap { cosine, lower })
-            }
+            Place::Axis(_) => by_slope(self.least_slope(direction, place), lower).map(|cosine| Cap { cosine, lower }),
             Place::Pole => {
-                // In coordinates along the axes.
-                let second = self.between.y / self.sine;
-                let first = self.between.x - second * self.axes[1].x;
-                let [a, b] = self.half_heights;
-                let slope = (a - first.abs()).min(b - second.abs()) * self.sine;
-                let curvature = self.curvature(direction, [0.0, 1.0]);
-                by_slope(slope, lower - curvature).map(|cosine| Cap { cosine, lower })
+                let bent = lower - self.curvature(direction, [0.0, 1.0]);
+                by_slope(self.least_slope(direction, place), bent).map(|cosine| Cap { cosine, lower })
             }
             Place::Circle(i) => {
-                let slope = self.half_heights[i] - self.slope_across(direction, i).abs();
+                let slope = self.least_slope(direction, place);
                 let rest = direction.gradient.dot(&direction.n.cross(&self.axes[i])).abs();
                 widest(|[cosine, sine]| {
                     let [first, mixed, last] = self.form_on_circle(direction, i, [cosine, sine]);
@@ -258,6 +260,73 @@ impl CrossedCylinders {
                 (bound >= lower - 0.5 * self.error).then_some(bound)
             }),
         }
+    }
+
+    /// Whether the normal of a candidate is that of the least overlap to 1e-7: where f is smooth it
+    /// curves enough, and at kinks it rises on all sides by more than rounding.
+    pub(super) fn is_aligned(&self, candidate: &Candidate) -> bool {
+        let Candidate { direction, place, .. } = candidate;
+        let rises = || self.least_slope(direction, *place) > self.error;
+        match *place {
+            Place::Axis(_) => rises(),
+            // What is across both axes is off by as much as these over the sine of their angle.
+            Place::Pole => rises() && self.turned <= ALIGNED * self.sine,
+            Place::Circle(i) => {
+                let [along, _, across] = self.form_on_circle(direction, i, HERE).map(|bent| bent - direction.overlap);
+                // Beside the circle, f is least where it rises no more.
+                let falls = self.error - self.least_slope(direction, *place);
+                self.error <= ALIGNED * along && (falls <= 0.0 || falls <= ALIGNED * across)
+            }
+            Place::Rims => self.error <= ALIGNED * (self.curvature(direction, HERE) - direction.overlap),
+        }
+    }
+
+    /// The unit tangent at a candidate along which f rises least, or about that.
+    pub(super) fn flattest(&self, candidate: &Candidate) -> Vector3<f64> {
+        let Candidate { direction, place, .. } = candidate;
+        let (e, f) = tangents(&direction.n);
+        match *place {
+            Place::Axis(i) => {
+                let smooth = self.smooth_at_axis(direction, i);
+                (smooth - direction.n * direction.n.dot(&smooth)).try_normalize(self.error).unwrap_or(e)
+            }
+            Place::Circle(i) => direction.n.cross(&self.axes[i]).normalize(),
+            Place::Pole => e,
+            Place::Rims => {
+                let [first, mixed, last] = self.form(direction, (&e, &f), HERE);
+                // Across the direction of the larger eigenvalue.
+                let angle = 0.5 * (2.0 * mixed).atan2(first - last) + std::f64::consts::FRAC_PI_2;
+                e * angle.cos() + f * angle.sin()
+            }
+        }
+    }
+
+    /// The least slope of f away from a kink, metres per radian: across it, or in any direction.
+    fn least_slope(&self, direction: &Direction, place: Place) -> f64 {
+        match place {
+            Place::Axis(i) => self.radii[i] - self.smooth_at_axis(direction, i).norm(),
+            Place::Circle(i) => self.half_heights[i] - self.slope_across(direction, i).abs(),
+            Place::Pole => {
+                // In coordinates along the axes.
+                let second = self.between.y / self.sine;
+                let first = self.between.x - second * self.axes[1].x;
+                let [a, b] = self.half_heights;
+                (a - first.abs()).min(b - second.abs()) * self.sine
+            }
+            Place::Rims => 0.0,
+        }
+    }
+
+    /// The gradient along an axis of what has no kink there, and of another kink the subgradient
+    /// with which it is shortest.
+    fn smooth_at_axis(&self, direction: &Direction, i: usize) -> Vector3<f64> {
+        let (j, mut smooth) = (1 - i, direction.gradient);
+        if direction.cosines[j].abs() <= ON_AXIS {
+            let (axis, half) = (&self.axes[j], self.half_heights[j]);
+            smooth -= axis * half.copysign(direction.cosines[j]);
+            smooth -= axis * smooth.dot(axis).clamp(-half, half);
+        }
+        smooth
     }
 
     /// The slope of f across a circle, metres per radian, along its axis, but for the kink.

@@ -14,7 +14,7 @@
 //! ```
 //!
 //! `n × τ` is the same all along it, and `|n × a|` up to the angle β at most `sin(α + β)`, α the
-//! angle between m and the axis. So ρ is at least λ, the smaller eigenvalue of the quadratic form
+//! acute angle between m and the axis, or 1 from π/2 on. So ρ is at least λ, the smaller eigenvalue of the quadratic form
 //! `Σ r (a · (m × τ))² / sin³(α + β)` of unit tangents τ, whose determinant is
 //! `r r' ((a × a') · m)² / (sin(α + β) sin(α' + β))³`, and
 //!
@@ -116,7 +116,8 @@ impl CrossedCylinders {
     pub(super) fn bound(&self, direction: &Direction, [cosine, sine]: Angle) -> f64 {
         let slope = direction.gradient.norm();
         // A larger curvature would cancel more digits.
-        let curvature = self.curvature(direction, [cosine, sine]).min(4.0 * (direction.overlap.abs() + slope));
+        let curvature = self.curvature(direction, [cosine, sine]);
+        let curvature = if curvature > 0.0 { curvature.min(4.0 * (direction.overlap.abs() + slope)) } else { 0.0 };
         let bent = curvature - direction.overlap;
         if bent * sine > slope * cosine {
             curvature - (bent * bent + slope * slope).sqrt()

@@ -23,12 +23,12 @@ mod candidates;
 mod direction;
 
 use self::candidates::Candidates;
-use self::direction::tangents;
-use super::cuboid_axes::{ALIGNED, LeastOverlap};
+use super::cuboid_axes::LeastOverlap;
 use crate::polynomial::gamma;
 use nalgebra::{Matrix3, Vector3};
 
-/// Two cylinders, in a frame whose x axis is along the first axis and whose z axis is across both.
+/// Two cylinders, in a frame whose x axis is along the first axis and whose z axis is across both;
+/// of either handedness.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CrossedCylinders {
     /// Metres.
@@ -44,6 +44,8 @@ pub(super) struct CrossedCylinders {
     frame: Matrix3<f64>,
     /// Both sizes and the vector between the centres, metres.
     reach: f64,
+    /// Bound of the error of the axes, radians.
+    turned: f64,
     /// Bound of the error of the overlap along a direction, metres.
     error: f64,
 }
@@ -67,11 +69,12 @@ impl CrossedCylinders {
         Self {
             radii,
             half_heights,
-            axes: [Vector3::x(), Vector3::new(axis.z, sine, 0.0)],
+            axes: [Vector3::x(), Vector3::new(axis.z.min(1.0), sine, 0.0)],
             sine,
             between: frame.tr_mul(&between),
             frame,
             reach,
+            turned,
             error: displacement + (turned + gamma(64)) * reach,
         }
     }
@@ -87,22 +90,25 @@ impl CrossedCylinders {
     pub(super) fn least_overlap(&self, elsewhere: f64) -> Option<LeastOverlap> {
         let mut candidates = Candidates::new(self);
         let proven = self.branch_and_bound(&mut candidates);
+        candidates.choose(self, elsewhere);
         let best = candidates.best().direction;
         let upper = best.overlap + self.error;
         let n = (self.frame * best.n).into();
         if upper < 0.0 {
             return Some(LeastOverlap { lower: f64::NEG_INFINITY, upper, n, elsewhere: f64::INFINITY });
         }
-        let lower = proven? - 2.0 * self.error;
-        let is_known = best.overlap - lower <= 4.0 * self.error && self.error <= ALIGNED * candidates.best_arm(self);
-        let elsewhere = self.elsewhere(&candidates, &best.n, elsewhere);
-        is_known.then_some(LeastOverlap { lower, upper, n, elsewhere })
+        let proven = proven?;
+        let is_known = best.overlap - proven <= 3.0 * self.error && self.is_aligned(candidates.best());
+        let elsewhere = self.elsewhere(&candidates, elsewhere);
+        is_known.then_some(LeastOverlap { lower: proven - 2.0 * self.error, upper, n, elsewhere })
     }
 
     /// The least overlap known along directions elsewhere, metres: candidates, what is symmetric to
     /// them, and where the cone of what is not elsewhere ends.
-    fn elsewhere(&self, candidates: &Candidates, n: &Vector3<f64>, elsewhere: f64) -> f64 {
-        let (e, f) = tangents(n);
+    fn elsewhere(&self, candidates: &Candidates, elsewhere: f64) -> f64 {
+        let n = &candidates.best().direction.n;
+        let e = self.flattest(candidates.best());
+        let f = n.cross(&e);
         let sine = (1.0 - elsewhere * elsewhere).sqrt();
         let around = [e, f, -e, -f].map(|tangent| n * elsewhere + tangent * sine);
         let symmetric = |m: Vector3<f64>| {
@@ -117,8 +123,9 @@ impl CrossedCylinders {
 
 #[cfg(test)]
 mod tests {
+    use super::candidates::Place;
+    use super::direction::tangents;
     use super::*;
-    use crate::measure::solver::exact_shape::crossed_cylinders::candidates::Place;
     use sublevel_testkit::Seeded;
 
     /// Two cylinders, the first along z.
@@ -141,7 +148,9 @@ mod tests {
             let [radii, heights] = self.sizes;
             let of = |i: usize| {
                 let along = n.dot(&self.axes[i]);
-                self.axes[i] * heights[i].copysign(along) + (n - self.axes[i] * along).normalize() * radii[i]
+                let radial = (n - self.axes[i] * along).normalize();
+                let radial = radial - self.axes[i] * self.axes[i].dot(&radial);
+                self.axes[i] * heights[i].copysign(along) + radial * radii[i]
             };
             of(0) + of(1)
         }
@@ -203,7 +212,7 @@ mod tests {
 
     #[test]
     fn no_direction_overlaps_by_less() {
-        let (mut met, mut open, mut apart) = ([0; 4], 0, 0);
+        let (mut met, mut open, mut apart, mut ties) = ([0; 4], 0, 0, [0; 2]);
         for seed in 0..4000 {
             let pair = Pair::random(seed);
             let crossed = pair.crossed();
@@ -221,6 +230,15 @@ mod tests {
             }
             assert!(found.upper - found.lower <= 8.0 * crossed.error(), "{label}");
             assert!(found.elsewhere >= found.lower, "{label}");
+            // Ties around the normal are seen, whatever the direction of the valley.
+            let (e, f) = tangents(&n);
+            let cone = (0..90).map(|i| {
+                let turn = std::f64::consts::TAU * f64::from(i) / 90.0;
+                pair.overlap(&(n * 0.99 + (e * turn.cos() + f * turn.sin()) * (1.0_f64 - 0.99 * 0.99).sqrt()))
+            });
+            if cone.fold(f64::INFINITY, f64::min) < found.upper * 1.01 {
+                ties[usize::from(found.elsewhere > found.upper * 1.02)] += 1;
+            }
             let least = brute_force(&pair, &mut Seeded(seed));
             assert!(found.lower <= least, "{label} against {least:e}");
             let mut candidates = Candidates::new(&crossed);
@@ -232,9 +250,50 @@ mod tests {
                 Place::Rims => 3,
             }] += 1;
         }
-        println!("axes, circles, pole, rims: {met:?}, open {open}, apart {apart}");
+        println!("axes, circles, pole, rims: {met:?}, open {open}, apart {apart}, ties seen, missed {ties:?}");
+        assert!(10 * ties[1] <= ties[0], "{ties:?}");
         assert!(met.iter().all(|count| *count > 200), "{met:?}");
         assert!(open < 400, "{open}");
+    }
+
+    /// From just inside of a place of the surface, that is the nearest one, and its normal is the
+    /// direction, also where rims are all but a wall or a cap, and where sizes differ.
+    #[test]
+    fn normals_are_those_of_the_surface() {
+        let (mut known, mut open) = (0, 0);
+        for seed in 0..6000 {
+            let mut random = Seeded(40_000 + seed);
+            let mut pair = Pair::random(4 * seed + 1);
+            for size in pair.sizes.iter_mut().flatten() {
+                *size *= 10_f64.powf(-2.0 * random.positive() * f64::from(u8::from(seed % 3 == 0)));
+            }
+            let tilt = 10_f64.powf(-8.0 + 5.0 * random.positive()) * 1_f64.copysign(random.signed());
+            let axis = pair.axes[random.index(2)];
+            let tangent = (random.unit() - axis).cross(&axis).normalize();
+            let n = match seed % 4 {
+                0 => random.unit(),
+                1 => (axis + tangent * tilt).normalize(),
+                _ => (tangent + axis * tilt).normalize(),
+            };
+            let thin = pair.sizes.iter().flatten().fold(f64::INFINITY, |least, size| least.min(*size));
+            let depth = 1e-3 * thin;
+            pair.between = pair.farthest(&n) - n * depth;
+            let Some(found) = pair.crossed().least_overlap(0.99) else {
+                open += 1;
+                continue;
+            };
+            let label = format!("seed {seed}, {n:?} {depth:e}: {found:?}");
+            let error = pair.crossed().error();
+            assert!(found.lower <= depth + error && found.upper >= 0.0, "{label}");
+            if found.upper < depth - error || found.elsewhere < depth + 1e-6 * depth {
+                continue;
+            }
+            known += 1;
+            // At a kink the normal of the place may be any up to the one that is found.
+            assert!((Vector3::from(found.n) - n).norm() <= 2e-7, "{label}");
+        }
+        println!("known {known}, open {open}");
+        assert!(known > 2000, "{known}");
     }
 
     /// Where a mirror image overlaps by as much, it is known as a direction elsewhere.
