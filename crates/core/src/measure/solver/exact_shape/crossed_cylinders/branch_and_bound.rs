@@ -4,8 +4,8 @@
 //! f is symmetric but for t: of a direction, its opposite and their mirror images, the one that
 //! points up and along the horizontal part of t overlaps least. No others are looked at.
 
-use super::CrossedCylinders;
 use super::candidates::{Candidates, Place};
+use super::pair::CrossedCylinders;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 

@@ -16,8 +16,8 @@
 //! with it, and with A, B, C the factors of the form of ρ it is enough that
 //! `k / tan(β/2) >= B² / (A - f) + max(f - C, 0)`.
 
-use super::CrossedCylinders;
 use super::direction::{Angle, Direction, HERE, ON_AXIS, tangents};
+use super::pair::CrossedCylinders;
 use crate::measure::solver::exact_shape::cuboid_axes::ALIGNED;
 use crate::measure::solver::exact_shape::cylinder_axes::EllipseArc;
 use crate::polynomial::gamma;

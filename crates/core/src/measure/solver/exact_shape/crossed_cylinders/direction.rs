@@ -22,7 +22,7 @@
 //! f >= λ + (f(m) - λ) cos s - |∇f(m)| sin s.
 //! ```
 
-use super::CrossedCylinders;
+use super::pair::CrossedCylinders;
 use crate::polynomial::gamma;
 use nalgebra::Vector3;
 

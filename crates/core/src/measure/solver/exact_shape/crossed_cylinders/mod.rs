@@ -21,69 +21,14 @@
 mod branch_and_bound;
 mod candidates;
 mod direction;
+mod pair;
 
 use self::candidates::Candidates;
+pub(super) use self::pair::CrossedCylinders;
 use super::cuboid_axes::LeastOverlap;
-use crate::polynomial::gamma;
-use nalgebra::{Matrix3, Vector3};
-
-/// Two cylinders, in a frame whose x axis is along the first axis and whose z axis is across both;
-/// of either handedness.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct CrossedCylinders {
-    /// Metres.
-    radii: [f64; 2],
-    half_heights: [f64; 2],
-    /// Unit vectors along the axes; the second has no negative component.
-    axes: [Vector3<f64>; 2],
-    /// Sine of their angle.
-    sine: f64,
-    /// From the centre of the first to that of the second, metres; not downwards.
-    between: Vector3<f64>,
-    /// From this frame to that of the first cylinder.
-    frame: Matrix3<f64>,
-    /// Both sizes and the vector between the centres, metres.
-    reach: f64,
-    /// Bound of the error of the axes, radians.
-    turned: f64,
-    /// Bound of the error of the overlap along a direction, metres.
-    error: f64,
-}
+use nalgebra::Vector3;
 
 impl CrossedCylinders {
-    /// Of a cylinder along z, and another one with this axis, a unit vector not along z, that far
-    /// from it; radii and half heights in metres. Axes are off by at most `turned` radians, places
-    /// by `displacement` metres besides.
-    pub(super) fn new(
-        [radii, half_heights]: [[f64; 2]; 2],
-        (axis, between): (Vector3<f64>, Vector3<f64>),
-        (turned, displacement): (f64, f64),
-    ) -> Self {
-        let axis = axis * 1_f64.copysign(axis.z);
-        let sine = axis.x.hypot(axis.y);
-        let (x, y) = (axis.x / sine, axis.y / sine);
-        let up = Vector3::new(-y, x, 0.0);
-        let up = up * 1_f64.copysign(up.dot(&between));
-        let frame = Matrix3::from_columns(&[Vector3::z(), Vector3::new(x, y, 0.0), up]);
-        let reach = radii[0].hypot(half_heights[0]) + radii[1].hypot(half_heights[1]) + between.norm();
-        Self {
-            radii,
-            half_heights,
-            axes: [Vector3::x(), Vector3::new(axis.z.min(1.0), sine, 0.0)],
-            sine,
-            between: frame.tr_mul(&between),
-            frame,
-            reach,
-            turned,
-            error: displacement + (turned + gamma(64)) * reach,
-        }
-    }
-
-    /// Bound of the error of the overlap along a direction, metres.
-    pub(super) fn error(&self) -> f64 {
-        self.error
-    }
-
     /// The direction from the first to the second, in the frame of the first, along which they
     /// overlap least; none where it is not known to 1e-7. Directions at an angle with a cosine
     /// below `elsewhere` are others.
