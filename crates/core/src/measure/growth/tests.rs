@@ -370,7 +370,7 @@ fn thin_rods_grow_along_the_right_normal() {
             let (p, q, r) = (ray.norm_squared(), ray.dot(&off), off.norm_squared() - radius * radius);
             let mu = (-q + (q * q - p * r).sqrt()) / p;
             let normal = (off + ray * mu) / radius;
-            // The general search has wider brackets, and normals that are off by more where rods are thin.
+            // The general search has wider brackets, and its normals are off by more.
             if answer.upper - answer.lower < 1e-11 {
                 assert!((answer.normal.unwrap() + normal).norm() < 3e-7, "{label} against {normal:?}");
                 by_planes += 1;

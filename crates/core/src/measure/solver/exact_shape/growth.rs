@@ -43,7 +43,8 @@ pub(in crate::measure) struct GrowthOfShapes {
 ///
 /// A plane keeps `g / (g + ρ)` of the error of the normal of the one before, g this length and ρ
 /// the radius of curvature of the sum. Larger, that is more; smaller, the rounding of short
-/// distances turns normals, and one pair in ten is left to the general search. Exercised by `cylinders_grow_as_the_general_search_says`.
+/// distances turns normals, and one pair in ten is left to the general search. Exercised by
+/// `cylinders_grow_as_the_general_search_says`.
 const OUTSIDE: f64 = 1e-2;
 
 /// Turn of the normal, radians, that counts as none: rounding of the points that it is across.
@@ -52,7 +53,7 @@ const OUTSIDE: f64 = 1e-2;
 /// smaller, rays through edges are left to the general search.
 const AT_REST: f64 = 1e-3 * ALIGNED;
 
-/// Most planes that are tried; half of all pairs take four.
+/// Most planes that are tried.
 ///
 /// Fewer, more pairs are left to the general search; more are in vain where the ray leaves through
 /// an edge. It changes time only.
@@ -83,10 +84,10 @@ pub(in crate::measure) fn growth_of_shapes(
             let (found, of_other) = with_ball((of_b, radius), of_a, radii).ok_or(0_u32)?;
             Ok(GrowthOfShapes { of_a: of_other, normal: -found.normal, ..found })
         }
-        _ => match of_cuboids(of_a, of_b, radii, start, options) {
-            Some(found) => Ok(found),
-            None => of_any(of_a, of_b, radii, start, options),
-        },
+        _ => of_cuboids(of_a, of_b, radii, start, options).or_else(|spent| {
+            let found = of_any(of_a, of_b, radii, start, &options.after(spent));
+            found.map(|found| GrowthOfShapes { steps: spent + found.steps, ..found }).map_err(|steps| spent + steps)
+        }),
     }
 }
 
@@ -137,21 +138,25 @@ fn with_ball(
     Some((found, center_b + (witness - center_b) / upper))
 }
 
+/// Of two boxes.
+///
+/// # Errors
+/// After how many steps it is not known, and of other shapes after none.
 fn of_cuboids(
     of_a: Placed<'_>,
     of_b: Placed<'_>,
     radii: [f64; 2],
     start: Option<&Vector3<f64>>,
     options: &Options<'_>,
-) -> Option<GrowthOfShapes> {
+) -> Result<GrowthOfShapes, u32> {
     let ((form_a, pose_a), (form_b, pose_b)) = (of_a, of_b);
-    let axes = cuboid_axes(of_a, of_b)?;
+    let axes = cuboid_axes(of_a, of_b).ok_or(0_u32)?;
     let ratio = |axis: &CuboidAxis| axis.apart.abs() / axis.width;
     let best = axes.all().into_iter().filter(CuboidAxis::is_accurate);
-    let best = best.max_by(|p, q| ratio(p).total_cmp(&ratio(q)))?;
+    let best = best.max_by(|p, q| ratio(p).total_cmp(&ratio(q))).ok_or(0_u32)?;
     let (vector, distance, vector_error) = across((pose_a, form_a.center()), (pose_b, form_b.center()));
     if !(distance * ALIGNED > vector_error && best.apart != 0.0) {
-        return None;
+        return Err(0);
     }
     let n = best.n / (best.length * 1_f64.copysign(best.apart));
     let normal = direction_to_world(form_b, pose_b, n.into());
@@ -162,15 +167,14 @@ fn of_cuboids(
     let moved = (pose_a.with_translation(center - arms[0]), pose_b.with_translation(-arms[1]));
     let start = start.map(|start| start - pose_a.translation() + moved.0.translation());
     let goal = (ALIGNED * gap, options);
-    let found =
-        between_shapes((form_a, &moved.0), (form_b, &moved.1), start.as_ref(), &StopCriterion::NARROW, goal).ok()?;
+    let found = between_shapes((form_a, &moved.0), (form_b, &moved.1), start.as_ref(), &StopCriterion::NARROW, goal)?;
     if (found.normal - normal).norm() > ALIGNED {
-        return None;
+        return Err(found.steps);
     }
     let error = axes.error();
     let lower = (best.apart.abs() - error) / (best.width + error) * (1.0 - gamma(8));
     let place = Touching { found, center, normal, width: best.width, error };
-    place.grown((of_a, radii), (vector, vector_error), lower)
+    place.grown((of_a, radii), (vector, vector_error), lower).ok_or(found.steps)
 }
 
 /// Of any two shapes with heights.

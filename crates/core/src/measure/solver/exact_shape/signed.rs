@@ -26,8 +26,7 @@ use nalgebra::{Matrix3, Vector3};
 ///
 /// The bracket is wider by this times their sizes: larger, that is more than asked for; smaller,
 /// cylinders whose poses were rounded to as much have no normal across both to 1e-7, and are left
-/// to the general search. Exercised by
-/// `parallel_cylinders_overlap_as_one_does`.
+/// to the general search. Exercised by `parallel_cylinders_overlap_as_one_does`.
 const PARALLEL: f64 = 1e-10;
 
 /// A proven bracket of the signed distance of two shapes, metres, and where it is attained; world

@@ -15,7 +15,8 @@ use nalgebra::Vector3;
 /// more, what comes to nothing takes longer than that.
 const MOST_TRIANGLES: u32 = 2048;
 
-/// Most triangles that wait: each halving leaves one, and a side is halved no more than 30 times.
+/// Most triangles that wait: each halving leaves one. Where there were more, the pair is left to the
+/// general search.
 const MOST_WAITING: usize = 64;
 
 /// Unit vectors along the edges of a cone of directions.

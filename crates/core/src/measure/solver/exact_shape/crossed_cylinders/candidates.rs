@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 
 /// Most candidates: nine that are known beforehand, and rims.
 ///
-/// Fewer, rims are dropped, and the pair may be left to the general search; more are never found.
+/// Fewer, rims are dropped, and the pair may be left to the general search; more take memory only.
 const MOST_CANDIDATES: usize = 24;
 
 /// Most steps of Newton's method.

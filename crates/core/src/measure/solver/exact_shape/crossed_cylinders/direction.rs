@@ -14,7 +14,8 @@
 //! ```
 //!
 //! `n × τ` is the same all along it, and `|n × a|` up to the angle β at most `sin(α + β)`, α the
-//! acute angle between m and the axis, or 1 from π/2 on. So ρ is at least λ, the smaller eigenvalue of the quadratic form
+//! acute angle between m and the axis, or 1 from π/2 on. So ρ is at least λ, the smaller eigenvalue
+//! of the quadratic form
 //! `Σ r (a · (m × τ))² / sin³(α + β)` of unit tangents τ, whose determinant is
 //! `r r' ((a × a') · m)² / (sin(α + β) sin(α' + β))³`, and
 //!
