@@ -12,7 +12,7 @@ use super::level::{Level, LevelProblem};
 use super::newton::newton;
 use super::projectable::{Offset, Projectable};
 use super::separating_plane::{SeparatingPlane, separating_plane};
-use super::start::{on_the_table, start};
+use super::start::{ELLIPSOID_TURNS, start};
 use crate::body::Body;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
@@ -131,7 +131,7 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
         let mut predicted = followed.map(|(_, predicted)| predicted);
         let mut guess = followed.map(|(guess, _)| guess);
         if guess.is_none() {
-            guess = self.seek(simd, &side, center, &mut rounds);
+            guess = self.seek(simd, center);
         }
         loop {
             // No closure: what is inlined into one is not compiled for the vectors at hand.
@@ -162,27 +162,19 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
 }
 
 impl<P: Projectable> ExactPair<'_, P> {
-    /// From the poses alone; none where the body's interior point is in the set.
+    /// From the poses alone; none where the body's interior point is in the set, or where the start
+    /// is in it or behind it, as near contact.
     #[inline(always)]
-    fn seek<S: Simd>(&self, simd: S, side: &Side<'_, f64>, center: V3<f64>, rounds: &mut u32) -> Option<Guess> {
+    fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Guess> {
         let seen = self.set.offset(simd, center);
         if !(seen.distance > 0.0) {
             return None;
         }
-        let (x, n) = match self.facing {
-            Some(n) => on_the_table(simd, &self.set, self.body, &self.relative, n),
-            None => start(simd, &self.set, self.body, &self.relative, seen.frame[2]),
-        };
+        let (n, turns) = self.facing.map_or((seen.frame[2], ELLIPSOID_TURNS), |n| (n, 0));
+        let (x, n) = start(simd, &self.set, self.body, &self.relative, n, turns);
         let seen = self.set.offset(simd, x);
-        let overshot = !(seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0);
-        if !overshot || self.options.exhausted(*rounds) {
-            return Some((x, seen));
-        }
-        // Tables overshoot flat tips, into the set or beyond: back to the surface.
-        *rounds += 1;
-        let (jet, _) = side.jet(simd, x);
-        let x = side.on_the_surface(simd, x, jet.value);
-        Some((x, self.set.offset(simd, x)))
+        let is_beside = seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0;
+        is_beside.then_some((x, seen))
     }
 
     /// Which side of contact they are on, by the least value over the set.

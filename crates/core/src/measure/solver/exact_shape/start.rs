@@ -27,7 +27,7 @@ use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::Simd;
 
 /// Most turns of the normal, or of a thin body steps of the point, on the ellipsoid.
-pub(super) const ELLIPSOID_TURNS: usize = 6;
+pub(in crate::measure) const ELLIPSOID_TURNS: usize = 6;
 
 /// Most looks at the support table.
 pub(super) const TABLE_LOOKS: usize = 3;
@@ -40,7 +40,8 @@ pub(super) const TABLE_LOOKS: usize = 3;
 pub(super) const SMALL_TURN: f64 = 1e-2;
 
 /// A point of the body and the direction against which it is about the farthest one; from the
-/// set's normal n at the body's centre on.
+/// set's normal n at the body's centre on, by at most so many turns on the ellipsoid: none where n
+/// is known to be about the normal that they end with.
 #[inline(always)]
 pub(in crate::measure) fn start<S: Simd, P: Projectable>(
     simd: S,
@@ -48,15 +49,16 @@ pub(in crate::measure) fn start<S: Simd, P: Projectable>(
     body: &Body,
     relative: &Relative<f64>,
     mut n: V3<f64>,
+    turns: usize,
 ) -> (V3<f64>, V3<f64>) {
     if body.outline().is_thin() {
-        let n = on_the_ellipsoid(simd, set, body, relative, n);
+        let n = on_the_ellipsoid(simd, set, body, relative, n, turns);
         return on_the_table(simd, set, body, relative, n);
     }
     let shape: M3<f64> = rows(simd, body.outline().shape());
     let turned = times_transposed::<S, f64>(&relative.rotation, &shape);
     let shape = times_transposed::<S, f64>(&turned, &relative.rotation);
-    for _ in 0..ELLIPSOID_TURNS {
+    for _ in 0..turns {
         let u = apply::<S, f64>(&shape, n);
         let inverse = 1.0 / dot::<S, f64>(n, u).sqrt();
         let seen = set.offset(simd, add_scaled::<S, f64>(relative.origin, -inverse, u));
@@ -80,7 +82,7 @@ pub(in crate::measure) fn start<S: Simd, P: Projectable>(
 /// The same on the support table, from a direction on; of a thin body the nearest point that was
 /// seen.
 #[inline(always)]
-pub(super) fn on_the_table<S: Simd, P: Projectable>(
+fn on_the_table<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     body: &Body,
@@ -121,13 +123,14 @@ fn on_the_ellipsoid<S: Simd, P: Projectable>(
     body: &Body,
     relative: &Relative<f64>,
     n: V3<f64>,
+    turns: usize,
 ) -> V3<f64> {
     let linear: M3<f64> = rows(simd, &body.normalization().linear);
     let inverse: M3<f64> = rows(simd, body.inverse());
     let radius = body.outline().radius();
     let mut z = normalized(simd, apply::<S, f64>(&linear, apply_transposed::<S, f64>(&relative.rotation, n)));
     z = scaled::<S, f64>(z, -1.0);
-    for _ in 0..ELLIPSOID_TURNS {
+    for _ in 0..turns {
         let out = scaled::<S, f64>(apply::<S, f64>(&inverse, z), radius);
         let out = apply::<S, f64>(&relative.rotation, out);
         let seen = set.offset(simd, add::<S, f64>(relative.origin, out));
