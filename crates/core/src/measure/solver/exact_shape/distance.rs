@@ -131,7 +131,7 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
         let mut predicted = followed.map(|(_, predicted)| predicted);
         let mut guess = followed.map(|(guess, _)| guess);
         if guess.is_none() {
-            guess = self.seek(simd, center);
+            guess = self.seek(simd, &side, center, &mut rounds);
         }
         loop {
             // No closure: what is inlined into one is not compiled for the vectors at hand.
@@ -163,9 +163,9 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
 
 impl<P: Projectable> ExactPair<'_, P> {
     /// From the poses alone; none where the body's interior point is in the set, or where the start
-    /// is in it or behind it, as near contact.
+    /// of a body that is not thin is in it or behind it, as near contact.
     #[inline(always)]
-    fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Guess> {
+    fn seek<S: Simd>(&self, simd: S, side: &Side<'_, f64>, center: V3<f64>, rounds: &mut u32) -> Option<Guess> {
         let seen = self.set.offset(simd, center);
         if !(seen.distance > 0.0) {
             return None;
@@ -174,7 +174,14 @@ impl<P: Projectable> ExactPair<'_, P> {
         let (x, n) = start(simd, &self.set, self.body, &self.relative, n, turns);
         let seen = self.set.offset(simd, x);
         let is_beside = seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0;
-        is_beside.then_some((x, seen))
+        if is_beside || !self.body.outline().is_thin() || self.options.exhausted(*rounds) {
+            return is_beside.then_some((x, seen));
+        }
+        // Tables overshoot flat tips, into the set or beyond: back to the surface.
+        *rounds += 1;
+        let (jet, _) = side.jet(simd, x);
+        let x = side.on_the_surface(simd, x, jet.value);
+        Some((x, self.set.offset(simd, x)))
     }
 
     /// Which side of contact they are on, by the least value over the set.
