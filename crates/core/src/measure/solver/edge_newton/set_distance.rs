@@ -28,8 +28,7 @@ use crate::measure::frames::vector::{
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::exact_shape::{
-    Cuboid, Cylinder, ELLIPSOID_TURNS, Offset, Projectable, Segment, SeparatingPlane, cold_start, seen_from,
-    separating_plane,
+    Cuboid, Cylinder, Offset, Projectable, Segment, SeparatingPlane, cold_start, seen_from, separating_plane,
 };
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -224,7 +223,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         if !(seen.distance > 0.0) {
             return None;
         }
-        let (x, n) = cold_start(simd, &self.set, self.side.body(), self.relative, seen.frame[2], ELLIPSOID_TURNS);
+        let (x, n) = cold_start(simd, &self.set, self.side.body(), self.relative, seen.frame[2]);
         let at = self.untried(simd, x);
         (dot::<S, f64>(at.seen.frame[2], n) > 0.0).then_some(at)
     }

@@ -2,12 +2,13 @@
 //!
 //! At the solution the tangents of the set's offset surface are those of the body, too. Where the
 //! normals still differ, W along the former is large for a thin body, as at its rim, and steps
-//! become as short as the body is thick. With n the direction of -∇g the residual `Tᵀv + (n·v) q`
-//! is the same, and the step starts from `α = 0`.
+//! become as short as the body is thick. With n the direction of -∇g, `v = x - P x` where a step
+//! leads and `q = W α - r`, the residual is `Tᵀv + (n·v) q`; Newton's method for it starts from
+//! `α = 0` and goes on with the features as they are.
 
-use super::newton::{Linearized, corrected};
+use super::newton::Linearized;
 use super::projectable::{Offset, Projectable};
-use crate::measure::frames::vector::{V3, basis, scaled};
+use crate::measure::frames::vector::{M3, V3, add, add_scaled, basis, dot, scaled};
 use crate::measure::solver::tangent_newton::{FEATURES, Plane, Side, SurfaceCurvature, moved};
 use crate::polynomial::{NumberJet, Simd, WithSimd};
 
@@ -61,4 +62,48 @@ impl<P: Projectable> WithSimd for AlongBody<'_, P> {
         let x = moved::<S, f64>(x, scaled::<S, f64>(step, share), &frame);
         (x, set.offset(simd, x))
     }
+}
+
+/// Tangential parts of a step after one of Newton's for its residual; none where the body does not
+/// face the set there. `smallest` (per metre) is added to the curvature that is divided by.
+#[inline(always)]
+fn corrected<S: Simd>(
+    _: S,
+    (of_body, &[t0, t1, n]): (&Linearized, &M3<f64>),
+    next: &Offset,
+    alpha: [f64; 2],
+    smallest: f64,
+) -> Option<[f64; 2]> {
+    let Linearized { r, w, .. } = of_body;
+    let [u0, u1, m] = next.frame;
+    let along = next.distance * dot::<S, f64>(m, n);
+    if !(along > 0.0) {
+        return None;
+    }
+    let q = [w[0] * alpha[0] + w[1] * alpha[1] - r[0], w[1] * alpha[0] + w[2] * alpha[1] - r[1]];
+    let residual =
+        [next.distance * dot::<S, f64>(m, t0) + along * q[0], next.distance * dot::<S, f64>(m, t1) + along * q[1]];
+    // The derivative of v along a tangent.
+    let bent = |t: V3<f64>| {
+        let (a, b) = (dot::<S, f64>(u0, t) * next.distance, dot::<S, f64>(u1, t) * next.distance);
+        let k = next.curvature;
+        let tangential =
+            add::<S, f64>(scaled::<S, f64>(u0, k[0] * a + k[1] * b), scaled::<S, f64>(u1, k[1] * a + k[2] * b));
+        add_scaled::<S, f64>(tangential, dot::<S, f64>(m, t), m)
+    };
+    let (b0, b1) = (bent(t0), bent(t1));
+    let (n0, n1) = (dot::<S, f64>(b0, n), dot::<S, f64>(b1, n));
+    let least = along * smallest;
+    let (j00, j01) =
+        (dot::<S, f64>(b0, t0) + along * w[0] + q[0] * n0, dot::<S, f64>(b1, t0) + along * w[1] + q[0] * n1);
+    let (j10, j11) =
+        (dot::<S, f64>(b0, t1) + along * w[1] + q[1] * n0, dot::<S, f64>(b1, t1) + along * w[2] + q[1] * n1);
+    let j = [[j00 + least, j01], [j10, j11 + least]];
+    let determinant = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+    if !(determinant > 0.0) {
+        return None;
+    }
+    let inverse = 1.0 / determinant;
+    let (of_0, of_1) = (j[1][1] * residual[0] - j[0][1] * residual[1], j[0][0] * residual[1] - j[1][0] * residual[0]);
+    Some([alpha[0] - of_0 * inverse, alpha[1] - of_1 * inverse])
 }

@@ -12,7 +12,7 @@ use super::level::{Level, LevelProblem};
 use super::newton::newton;
 use super::projectable::{Offset, Projectable};
 use super::separating_plane::{SeparatingPlane, separating_plane};
-use super::start::{ELLIPSOID_TURNS, start};
+use super::start::{on_the_ellipsoid, on_the_table};
 use crate::body::Body;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, dot, rows, scaled, subtract,
@@ -162,18 +162,21 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
 }
 
 impl<P: Projectable> ExactPair<'_, P> {
-    /// From the poses alone; none where the body's interior point is in the set, or where the start
-    /// of a body that is not thin is in it or behind it, as near contact.
+    /// From the poses alone; none where the body's interior point is in the set, or where no plane
+    /// separates the start from it, as near contact.
     #[inline(always)]
     fn seek<S: Simd>(&self, simd: S, side: &Side<'_, f64>, center: V3<f64>, rounds: &mut u32) -> Option<Guess> {
         let seen = self.set.offset(simd, center);
         if !(seen.distance > 0.0) {
             return None;
         }
-        let (n, turns) = self.facing.map_or((seen.frame[2], ELLIPSOID_TURNS), |n| (n, 0));
-        let (x, n) = start(simd, &self.set, self.body, &self.relative, n, turns);
+        let n = match self.facing {
+            Some(n) => n,
+            None => on_the_ellipsoid(simd, &self.set, self.body, &self.relative, seen.frame[2]),
+        };
+        let (x, n) = on_the_table(simd, &self.set, self.body, &self.relative, n);
         let seen = self.set.offset(simd, x);
-        let is_beside = seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0;
+        let is_beside = self.set.separation(simd, n, (x, 0.0)) > 0.0;
         if is_beside || !self.body.outline().is_thin() || self.options.exhausted(*rounds) {
             return is_beside.then_some((x, seen));
         }
@@ -181,7 +184,8 @@ impl<P: Projectable> ExactPair<'_, P> {
         *rounds += 1;
         let (jet, _) = side.jet(simd, x);
         let x = side.on_the_surface(simd, x, jet.value);
-        Some((x, self.set.offset(simd, x)))
+        let seen = self.set.offset(simd, x);
+        (seen.distance > 0.0 && dot::<S, f64>(seen.frame[2], n) > 0.0).then_some((x, seen))
     }
 
     /// Which side of contact they are on, by the least value over the set.

@@ -24,6 +24,7 @@ mod shape_pair;
 mod shapes;
 mod signed;
 mod start;
+mod thin_ellipsoid;
 
 pub(in crate::measure) use cuboid::Cuboid;
 pub(in crate::measure) use cylinder::Cylinder;
@@ -43,4 +44,4 @@ pub(in crate::measure) use segment::Segment;
 pub(in crate::measure) use separating_plane::{SeparatingPlane, separating_plane};
 pub(in crate::measure) use shapes::{ShapeContact, ShapeDistance, between_shapes, contact_of_shapes};
 pub(in crate::measure) use signed::{SignedShapes, signed_of_shapes};
-pub(in crate::measure) use start::{ELLIPSOID_TURNS, start as cold_start};
+pub(in crate::measure) use start::start as cold_start;

@@ -1,33 +1,33 @@
 //! Where a cold start begins: about where a body is nearest to a set with a closed form.
 //!
-//! For a unit vector n let x(n) be the point of the body farthest along -n. The nearest point is
-//! x(n) for the n with `n(x(n)) = n`, the normal of the set's offset surface there. With U the
-//! derivative of -x by n and K that of n(x), Newton's method for it turns n by δ along the
-//! tangents, `(I + K U) δ = n(x(n)) - n`: on the ellipsoid that stands for the body first, then on
-//! its support table.
-//!
-//! Of a thin body x(n) crosses the whole side while n turns by no more than the thickness, so that
-//! such turns overshoot. There the point of the ellipsoid is looked for and not its normal: with
-//! `x = c + A z`, |z| = 1, `v = x - P x` and J the derivative of v, Newton's method on the sphere
-//! for the least `|v|² / 2` has the step s across z with
+//! For a unit vector n let x be the point of the body farthest along -n, U the derivative of -x by
+//! n, P x the nearest point of the set and `D = n·(x - P x)`. To second order the body's surface is
+//! a paraboloid about x whose curvature is the inverse of U. Its point nearest to a point y of the
+//! set is `y + D M (x - y)`, and half the square of that distance, to the same order, `D / 2` times
 //!
 //! ```text
-//! (AᵀJA + μ I) s = -Aᵀv + ν z,    μ = -z·Aᵀv,
+//! (x - y)ᵀ M (x - y),    M = (U + D I)⁻¹.
 //! ```
 //!
-//! which starts where the way from the centre to the set leaves the ellipsoid: μ is above 0 there.
+//! So the next n is along `M (x - y)` for the point y of the set where this is least, however many
+//! faces and edges of the set lie on the way: on the ellipsoid that stands for the body first, then
+//! on its support table.
+//!
+//! Of a thin body x crosses the whole side while n turns by no more than the thickness, so that such
+//! turns overshoot: [`super::thin_ellipsoid`] looks for the point of the ellipsoid and not for its normal.
 
 use super::projectable::{Offset, Projectable};
+use super::thin_ellipsoid::ThinEllipsoid;
 use crate::body::Body;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, normalized, rows, scaled,
     subtract, times_transposed,
 };
 use crate::measure::solver::tangent_newton::Relative;
-use crate::polynomial::Simd;
+use crate::polynomial::{Simd, dispatch};
 
 /// Most turns of the normal, or of a thin body steps of the point, on the ellipsoid.
-pub(in crate::measure) const ELLIPSOID_TURNS: usize = 6;
+pub(super) const ELLIPSOID_TURNS: usize = 6;
 
 /// Most looks at the support table.
 pub(super) const TABLE_LOOKS: usize = 3;
@@ -39,50 +39,71 @@ pub(super) const TABLE_LOOKS: usize = 3;
 /// changes time only; no test pins it.
 pub(super) const SMALL_TURN: f64 = 1e-2;
 
+/// Least cosine of the angle between n and the way to the body, dimensionless, that D is computed
+/// with.
+///
+/// Larger, turns are shorter than they have to be; smaller, n may turn away from the body. It
+/// changes time only; no test pins it.
+const STEEPEST: f64 = 0.1;
+
 /// A point of the body and the direction against which it is about the farthest one; from the
-/// set's normal n at the body's centre on, by at most so many turns on the ellipsoid: none where n
-/// is known to be about the normal that they end with.
+/// set's normal n at the body's centre on.
 #[inline(always)]
 pub(in crate::measure) fn start<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     body: &Body,
     relative: &Relative<f64>,
-    mut n: V3<f64>,
-    turns: usize,
+    n: V3<f64>,
 ) -> (V3<f64>, V3<f64>) {
+    let n = on_the_ellipsoid(simd, set, body, relative, n);
+    on_the_table(simd, set, body, relative, n)
+}
+
+/// The set's normal about where the ellipsoid that stands for the body is nearest to it, from the
+/// set's normal n at the body's centre on.
+#[inline(always)]
+pub(super) fn on_the_ellipsoid<S: Simd, P: Projectable>(
+    simd: S,
+    set: &P,
+    body: &Body,
+    relative: &Relative<f64>,
+    mut n: V3<f64>,
+) -> V3<f64> {
     if body.outline().is_thin() {
-        let n = on_the_ellipsoid(simd, set, body, relative, n, turns);
-        return on_the_table(simd, set, body, relative, n);
+        return dispatch(ThinEllipsoid { set, body, relative, n, steps: ELLIPSOID_TURNS, small: SMALL_TURN });
     }
     let shape: M3<f64> = rows(simd, body.outline().shape());
     let turned = times_transposed::<S, f64>(&relative.rotation, &shape);
     let shape = times_transposed::<S, f64>(&turned, &relative.rotation);
-    for _ in 0..turns {
+    let (mut best, mut nearest) = (n, f64::INFINITY);
+    for _ in 0..ELLIPSOID_TURNS {
         let u = apply::<S, f64>(&shape, n);
         let inverse = 1.0 / dot::<S, f64>(n, u).sqrt();
-        let seen = set.offset(simd, add_scaled::<S, f64>(relative.origin, -inverse, u));
+        let x = add_scaled::<S, f64>(relative.origin, -inverse, u);
+        let seen = set.offset(simd, x);
         let off = subtract::<S, f64>(seen.frame[2], n);
         if !(seen.distance > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
+            best = n;
             break;
         }
-        let [t0, t1, _] = seen.frame;
-        let (s0, s1) = (apply::<S, f64>(&shape, t0), apply::<S, f64>(&shape, t1));
-        let (q0, q1) = (dot::<S, f64>(u, t0) * inverse, dot::<S, f64>(u, t1) * inverse);
-        let bend = [
-            (dot::<S, f64>(s0, t0) - q0 * q0) * inverse,
-            (dot::<S, f64>(s0, t1) - q0 * q1) * inverse,
-            (dot::<S, f64>(s1, t1) - q1 * q1) * inverse,
-        ];
-        n = turn(simd, n, off, &seen, bend);
+        if !(seen.distance < nearest) {
+            n = normalized(simd, add::<S, f64>(n, best));
+            continue;
+        }
+        (best, nearest) = (n, seen.distance);
+        let square = inverse * inverse;
+        let entry = |i: usize, j: usize| (shape[i][j] - u[i] * u[j] * square) * inverse;
+        let bend = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
+        n = turn(simd, set, n, (x, &seen), bend);
     }
-    on_the_table(simd, set, body, relative, n)
+    best
 }
 
-/// The same on the support table, from a direction on; of a thin body the nearest point that was
-/// seen.
+/// The point of the body nearest to the set of those that its support table shows, and the
+/// direction against which it is about the farthest one, from such a direction on.
 #[inline(always)]
-fn on_the_table<S: Simd, P: Projectable>(
+pub(super) fn on_the_table<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     body: &Body,
@@ -99,78 +120,16 @@ fn on_the_table<S: Simd, P: Projectable>(
             return start;
         }
         let off = subtract::<S, f64>(seen.frame[2], n);
-        if look == TABLE_LOOKS || !(seen.distance > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
+        if look == TABLE_LOOKS || !(set.separation(simd, n, (x, 0.0)) > 0.0) || dot::<S, f64>(off, off) < SMALL_TURN {
             return (x, n);
         }
-        if body.outline().is_thin() {
-            (best, nearest) = (Some((x, n)), seen.distance);
-        }
-        let [t0, t1, _] = seen.frame;
-        let (a0, a1) =
-            (apply_transposed::<S, f64>(&relative.rotation, t0), apply_transposed::<S, f64>(&relative.rotation, t1));
-        let (b0, b1) = (apply_symmetric::<S, f64>(&bend, a0), apply_symmetric::<S, f64>(&bend, a1));
-        n = turn(simd, n, off, &seen, [dot::<S, f64>(b0, a0), dot::<S, f64>(b0, a1), dot::<S, f64>(b1, a1)]);
+        (best, nearest) = (Some((x, n)), seen.distance);
+        let rows = [[bend[0], bend[1], bend[2]], [bend[1], bend[3], bend[4]], [bend[2], bend[4], bend[5]]];
+        let turned = times_transposed::<S, f64>(&relative.rotation, &rows);
+        let rows = times_transposed::<S, f64>(&turned, &relative.rotation);
+        n = turn(simd, set, n, (x, &seen), [rows[0][0], rows[0][1], rows[0][2], rows[1][1], rows[1][2], rows[2][2]]);
     }
     unreachable!("the last look returns")
-}
-
-/// The inward normal where the ellipsoid that stands for a thin body is nearest to the set, from
-/// the set's normal n at the body's centre on.
-#[inline(always)]
-fn on_the_ellipsoid<S: Simd, P: Projectable>(
-    simd: S,
-    set: &P,
-    body: &Body,
-    relative: &Relative<f64>,
-    n: V3<f64>,
-    turns: usize,
-) -> V3<f64> {
-    let linear: M3<f64> = rows(simd, &body.normalization().linear);
-    let inverse: M3<f64> = rows(simd, body.inverse());
-    let radius = body.outline().radius();
-    let mut z = normalized(simd, apply::<S, f64>(&linear, apply_transposed::<S, f64>(&relative.rotation, n)));
-    z = scaled::<S, f64>(z, -1.0);
-    for _ in 0..turns {
-        let out = scaled::<S, f64>(apply::<S, f64>(&inverse, z), radius);
-        let out = apply::<S, f64>(&relative.rotation, out);
-        let seen = set.offset(simd, add::<S, f64>(relative.origin, out));
-        if !(seen.distance > 0.0) {
-            break;
-        }
-        // The set's tangents and normal in normalized coordinates.
-        let [t0, t1, m] = seen.frame.map(|t| {
-            let own = apply_transposed::<S, f64>(&relative.rotation, t);
-            scaled::<S, f64>(apply_transposed::<S, f64>(&inverse, own), radius)
-        });
-        // Where the ellipsoid reaches through the set there is no nearest point.
-        let pull = -dot::<S, f64>(z, m);
-        if !(pull > 0.0) {
-            break;
-        }
-        let [k00, k01, k11] = seen.curvature;
-        let (b0, b1) = (
-            add_scaled::<S, f64>(scaled::<S, f64>(t0, k00), k01, t1),
-            add_scaled::<S, f64>(scaled::<S, f64>(t1, k11), k01, t0),
-        );
-        // Everything over the distance.
-        let entry = |i: usize, j: usize| b0[i] * t0[j] + b1[i] * t1[j] + m[i] * m[j] / seen.distance;
-        let hessian =
-            [entry(0, 0) + pull, entry(0, 1), entry(0, 2), entry(1, 1) + pull, entry(1, 2), entry(2, 2) + pull];
-        let (cofactors, determinant) = cofactors(simd, hessian);
-        let (of_m, of_z) = (apply_symmetric::<S, f64>(&cofactors, m), apply_symmetric::<S, f64>(&cofactors, z));
-        let across = dot::<S, f64>(z, of_m) / dot::<S, f64>(z, of_z);
-        let step = scaled::<S, f64>(add_scaled::<S, f64>(of_m, -across, of_z), -1.0 / determinant);
-        let square = dot::<S, f64>(step, step);
-        if !square.is_finite() {
-            break;
-        }
-        z = normalized(simd, add::<S, f64>(z, step));
-        if square < SMALL_TURN {
-            break;
-        }
-    }
-    let outward = apply::<S, f64>(&relative.rotation, apply_transposed::<S, f64>(&linear, z));
-    scaled::<S, f64>(normalized(simd, outward), -1.0)
 }
 
 /// About the point of the body farthest along -n, and its derivative by that direction in the
@@ -183,15 +142,99 @@ fn farthest<S: Simd>(simd: S, body: &Body, relative: &Relative<f64>, n: V3<f64>)
     (add::<S, f64>(relative.origin, point), cell.turn)
 }
 
-/// n turned by `(I + K U)⁻¹` of what it is off by, along the tangents of the set.
+/// The next normal, from the point x of the body farthest along -n on, which lies outside of the
+/// set, and the derivative of -x by n: xx, xy, xz, yy, yz, zz.
 #[inline(always)]
-fn turn<S: Simd>(simd: S, n: V3<f64>, off: V3<f64>, seen: &Offset, u: [f64; 3]) -> V3<f64> {
-    let [t0, t1, _] = seen.frame;
-    let k = seen.curvature;
-    let (m00, m01) = (1.0 + k[0] * u[0] + k[1] * u[1], k[0] * u[1] + k[1] * u[2]);
-    let (m10, m11) = (k[1] * u[0] + k[2] * u[1], 1.0 + k[1] * u[1] + k[2] * u[2]);
-    let (d0, d1) = (dot::<S, f64>(off, t0), dot::<S, f64>(off, t1));
-    let inverse = 1.0 / (m00 * m11 - m01 * m10);
-    let (e0, e1) = ((m11 * d0 - m01 * d1) * inverse, (m00 * d1 - m10 * d0) * inverse);
-    normalized(simd, add_scaled::<S, f64>(add_scaled::<S, f64>(n, e0, t0), e1, t1))
+fn turn<S: Simd, P: Projectable>(
+    simd: S,
+    set: &P,
+    n: V3<f64>,
+    (x, seen): (V3<f64>, &Offset),
+    mut metric: [f64; 6],
+) -> V3<f64> {
+    let v = scaled::<S, f64>(seen.frame[2], seen.distance);
+    let depth = dot::<S, f64>(n, v).max(STEEPEST * seen.distance);
+    for diagonal in [0, 3, 5] {
+        metric[diagonal] += depth;
+    }
+    // Any multiple of M will do.
+    let (metric, _) = cofactors(simd, metric);
+    let gradient = scaled::<S, f64>(apply_symmetric::<S, f64>(&metric, v), -1.0);
+    let y = set.least(simd, subtract::<S, f64>(x, v), gradient, &metric);
+    normalized(simd, apply_symmetric::<S, f64>(&metric, subtract::<S, f64>(x, y)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SMALL_TURN, farthest, on_the_ellipsoid, turn};
+    use crate::body::Body;
+    use crate::measure::solver::exact_shape::{Cuboid, Projectable};
+    use crate::measure::solver::tangent_newton::Relative;
+    use crate::measure::{Options, Pose, WarmStart, distance};
+    use crate::polynomial::Scalar;
+    use nalgebra::Vector3;
+    use sublevel_testkit::Seeded;
+
+    const HALF_EXTENTS: [f64; 3] = [0.4, 0.3, 0.2];
+
+    /// For a ball about c that is nearest to a corner y of the box, the next normal is along `c - y`
+    /// from every n whose point x is nearest to the same corner.
+    #[test]
+    fn one_turn_of_a_ball_beyond_a_corner_is_exact() {
+        let set = Cuboid { half_extents: HALF_EXTENTS };
+        let mut count = 0;
+        for seed in 0..2000 {
+            let mut random = Seeded(seed);
+            let corner = Vector3::from(HALF_EXTENTS.map(|h| h.copysign(random.signed())));
+            let radius = 10_f64.powf(random.signed());
+            let mut direction = || Vector3::from([(); 3].map(|()| random.signed())).normalize();
+            let (to, n) = (direction(), direction());
+            let to = to.component_mul(&corner).map(f64::abs).component_mul(&corner.map(f64::signum)).normalize();
+            let center = corner + to * (2.0 * radius);
+            let x = center - radius * n;
+            let seen = set.offset(Scalar, x.into());
+            let depth = n.dot(&(x - corner));
+            // Beyond no other corner, and no depth that is cut.
+            if set.project(Scalar, x.into()) != <[f64; 3]>::from(corner) || depth < 0.2 * seen.distance {
+                continue;
+            }
+            count += 1;
+            let bend = |i: usize, j: usize| radius * (f64::from(u8::from(i == j)) - n[i] * n[j]);
+            let bend = [bend(0, 0), bend(0, 1), bend(0, 2), bend(1, 1), bend(1, 2), bend(2, 2)];
+            let turned = Vector3::from(turn(Scalar, &set, n.into(), (x.into(), &seen), bend));
+            assert!((turned - to).norm() < 1e-9, "seed {seed}: {turned} {to}");
+        }
+        assert!(count > 200, "{count}");
+    }
+
+    /// Ellipsoids, thin ones also, beside every feature of a box: about the normal of the distance.
+    #[test]
+    fn the_ellipsoid_is_turned_to_the_normal_of_the_distance() {
+        let set = Cuboid { half_extents: HALF_EXTENTS };
+        let cuboid = Body::cuboid("box", HALF_EXTENTS.into()).unwrap();
+        let (mut close, mut count, mut features) = (0, 0, [0; 8]);
+        for seed in 0..300 {
+            let mut random = Seeded(seed);
+            let thinnest = if seed % 4 == 0 { -3.0 } else { -0.7 };
+            let radii = Vector3::from([(); 3].map(|()| 10_f64.powf(thinnest * random.positive())));
+            let body = Body::superellipsoid("ellipsoid", Vector3::zeros(), radii, 2).unwrap();
+            let rotation =
+                nalgebra::UnitQuaternion::from_scaled_axis(Vector3::from([(); 3].map(|()| 3.0 * random.signed())));
+            let at = Vector3::from([(); 3].map(|()| 1.5 * random.signed()));
+            let pose = Pose::from_quaternion(at, rotation.coords.into()).unwrap();
+            let answer =
+                distance(&cuboid, &Pose::identity(), &body, &pose, &Options::default(), &mut WarmStart::default());
+            let Some(normal) = answer.normal.filter(|_| answer.upper > 1e-3) else { continue };
+            let relative = Relative::new(Scalar, &cuboid, &Pose::identity(), &body, &pose);
+            let seen = set.offset(Scalar, at.into());
+            let n = on_the_ellipsoid(Scalar, &set, &body, &relative, seen.frame[2]);
+            let (x, _) = farthest(Scalar, &body, &relative, n);
+            features[usize::from(set.offset(Scalar, x).feature)] += 1;
+            count += 1;
+            close += u32::from((Vector3::from(n) + normal).norm_squared() < SMALL_TURN);
+        }
+        println!("{close} of {count} close, features {features:?}");
+        assert!(features[1..].iter().all(|count| *count >= 3), "{features:?}");
+        assert!(20 * close > 17 * count, "{close} of {count}");
+    }
 }

@@ -1,4 +1,11 @@
-//! Where cold starts begin, in lanes; derived in [`super::super::start`].
+//! Where cold starts begin, in lanes: as in [`super::super::start`], but each turn keeps to one
+//! feature of the set.
+//!
+//! For a unit vector n let x(n) be the point of the body farthest along -n. The nearest point is
+//! x(n) for the n with `n(x(n)) = n`, the normal of the set's offset surface there. With U the
+//! derivative of -x by n and K that of n(x), Newton's method for it turns n by δ along the
+//! tangents, `(I + K U) δ = n(x(n)) - n`. Lanes that this leads into the set or behind it are
+//! solved by themselves.
 
 use super::super::start::{ELLIPSOID_TURNS, SMALL_TURN, TABLE_LOOKS};
 use super::set::{LaneOffset, LaneSet};
