@@ -216,7 +216,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         self.run(simd, at, &mut rounds).map_err(|_| rounds)
     }
 
-    /// From the poses alone; none where tables overshoot the set, as where the body reaches it.
+    /// From the poses alone; none where no plane separates the start from the set, as near contact.
     #[inline(always)]
     fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Iterate> {
         let seen = self.set.offset(simd, center);
@@ -224,8 +224,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
             return None;
         }
         let (x, n) = cold_start(simd, &self.set, self.side.body(), self.relative, seen.frame[2]);
-        let at = self.untried(simd, x);
-        (dot::<S, f64>(at.seen.frame[2], n) > 0.0).then_some(at)
+        (self.set.separation(simd, n, (x, 0.0)) > 0.0).then(|| self.untried(simd, x))
     }
 
     /// A point of which nothing else is known.
