@@ -15,7 +15,7 @@ use crate::measure::frames::vector::V3;
 use crate::measure::options::Options;
 use crate::measure::solver::active_constraints::ActiveConstraints;
 use crate::measure::solver::common_point::CommonPoint;
-use crate::measure::solver::continuation::{Follow, Lost, Proven, Seek};
+use crate::measure::solver::continuation::{Follow, Lost, Proven, Seek, Trace};
 use crate::measure::solver::exact_shape::{ShapeContact, contact_of_shapes};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::stages::{Stage, runs};
@@ -352,8 +352,9 @@ impl WithSimd for Cold<'_> {
         let Self { query, before, warm } = self;
         let (a, b, options, relation) = (query.of_a.0, query.of_b.0, query.options, query.relation());
         let most = SEEK_ROUNDS.min(options.max_iterations() - before);
-        match (Seek { a, b, relation, from: None, most, options }).with_simd(simd) {
-            Ok((proven, trace)) => {
+        let mut trace = Trace::default();
+        match (Seek { a, b, relation, from: None, most, options, trace: &mut trace }).with_simd(simd) {
+            Ok(proven) => {
                 *warm = Hint::Smooth(trace).into();
                 let proven = Proven { rounds: before + proven.rounds, ..proven };
                 query.answer(simd, &proven, relation.tolerance)

@@ -12,7 +12,7 @@ use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::barrier_programs::split;
-use crate::measure::solver::continuation::{Follow, Seek};
+use crate::measure::solver::continuation::{Follow, Seek, Trace};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::ray_program::{RayStart, ReachNewton, ReachProgram};
 use crate::measure::solver::stages::{Stage, runs};
@@ -63,8 +63,9 @@ fn by_search(
     }
     if runs(Stage::Seek) && a.is_smooth() && b.is_smooth() && along.is_sure() && !options.exhausted(spent) {
         let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
-        match dispatch(Seek { a, b, relation: along, from: None, most, options }) {
-            Ok((proven, trace)) => {
+        let mut trace = Trace::default();
+        match dispatch(Seek { a, b, relation: along, from: None, most, options, trace: &mut trace }) {
+            Ok(proven) => {
                 *warm = Hint::Smooth(trace).into();
                 let answer = along.answer(a, pose_a, pose_b, &proven);
                 return GrowthDistance { iterations: spent + proven.rounds, ..answer };

@@ -26,7 +26,7 @@ use nalgebra::Vector3;
 
 /// What is kept of an answer for the next query of the pair. Points from the centres of the bodies'
 /// normalizations on, metres.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(in crate::measure) struct Trace {
     /// Active constraint of A and of B.
     active: [u8; 2],
@@ -49,13 +49,6 @@ struct Spot {
 }
 
 impl Trace {
-    /// A trace of nothing yet.
-    #[inline(always)]
-    fn blank(active: [u8; 2]) -> Self {
-        let (nowhere, response) = (Spot::default(), Response::default());
-        Self { active, of_a: nowhere, of_b: nowhere, tangents: [[0.0; 3]; 2], response, drift: Drift::default() }
-    }
-
     /// Witnesses of A and of B, each in its body's frame, from the centre of its normalization on,
     /// metres.
     pub(in crate::measure) fn points(&self) -> [V3<f64>; 2] {
@@ -106,7 +99,7 @@ impl Trace {
         let of_b = linearized(&Side::away(simd, b, active[1].into(), &relative), y);
         let difference = apply::<Scalar, f64>(&frame, subtract::<Scalar, f64>(x, y));
         let (_, response) = newton(simd, (&of_a.0, &of_a.1), (&of_b.0, &of_b.1), difference, flattest(limits(a, b)));
-        let mut trace = Self::blank(active);
+        let mut trace = Self { active, ..Self::default() };
         trace.take_down(simd, &relative, [x, y, n], &frame, response);
         trace
     }
@@ -260,15 +253,17 @@ pub(in crate::measure) struct Seek<'a, R> {
     pub(in crate::measure) most: u32,
     /// Whose stop flag is polled.
     pub(in crate::measure) options: &'a Options<'a>,
+    /// That of the answer if it is proven.
+    pub(in crate::measure) trace: &'a mut Trace,
 }
 
 impl<R: Relation> WithSimd for Seek<'_, R> {
-    type Output = Result<(Proven, Trace), Lost>;
+    type Output = Result<Proven, Lost>;
 
-    /// The proven answer with its trace, or what is left.
+    /// The proven answer, or what is left.
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Result<(Proven, Trace), Lost> {
-        let Self { a, b, relation, from, most, options } = self;
+    fn with_simd<S: Simd>(self, simd: S) -> Result<Proven, Lost> {
+        let Self { a, b, relation, from, most, options, trace } = self;
         let relative = relation.relative(simd, a, b);
         let (start, active) = match from {
             Some(start) => (start, [0; 2]),
@@ -292,9 +287,8 @@ impl<R: Relation> WithSimd for Seek<'_, R> {
             }
         }
         let at = Iterate { x: start.x, y: start.y, frame: basis(simd, start.n) };
-        let mut trace = Trace::blank(active);
-        let proven = correct.run(simd, &relative, at, &mut trace)?;
-        Ok((proven, trace))
+        trace.active = active;
+        correct.run(simd, &relative, at, trace)
     }
 }
 

@@ -324,8 +324,9 @@ impl<'a> Search<'a> {
         let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance, facing: None };
         let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options }) {
-            Ok((proven, trace)) => {
+        let mut trace = Trace::default();
+        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from, most, options, trace: &mut trace }) {
+            Ok(proven) => {
                 self.iterations += proven.rounds;
                 self.resume(&proven);
                 // As it was taken as proven.

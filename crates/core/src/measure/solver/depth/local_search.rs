@@ -187,8 +187,9 @@ impl<'a> Best<'a> {
             return false;
         }
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        match dispatch(Seek { a: pair.a.body, b: pair.b.body, relation, from: None, most, options }) {
-            Ok((proven, trace)) => {
+        let (mut trace, (a, b)) = (Trace::default(), (pair.a.body, pair.b.body));
+        match dispatch(Seek { a, b, relation, from: None, most, options, trace: &mut trace }) {
+            Ok(proven) => {
                 self.take(&proven, trace);
                 true
             }
