@@ -81,6 +81,14 @@ pub(in crate::measure) fn times_transposed<S: Simd, N: Number<S>>(m: &M3<N>, n: 
     [apply(n, m[0]), apply(n, m[1]), apply(n, m[2])]
 }
 
+/// `R M Rᵀ` of a symmetric matrix with the entries xx, xy, xz, yy, yz, zz.
+#[inline(always)]
+pub(in crate::measure) fn turned_symmetric<S: Simd, N: Number<S>>(rotation: &M3<N>, m: &[N; 6]) -> [N; 6] {
+    let [r0, r1, r2] = *rotation;
+    let (m0, m1, m2) = (apply_symmetric(m, r0), apply_symmetric(m, r1), apply_symmetric(m, r2));
+    [dot(r0, m0), dot(r0, m1), dot(r0, m2), dot(r1, m1), dot(r1, m2), dot(r2, m2)]
+}
+
 /// `H v` of the symmetric matrix with the entries xx, xy, xz, yy, yz, zz.
 #[inline(always)]
 pub(in crate::measure) fn apply_symmetric<S: Simd, N: Number<S>>(h: &[N; 6], v: V3<N>) -> V3<N> {

@@ -253,7 +253,7 @@ pub(in crate::measure) struct Seek<'a, R> {
     pub(in crate::measure) most: u32,
     /// Whose stop flag is polled.
     pub(in crate::measure) options: &'a Options<'a>,
-    /// That of the answer if it is proven.
+    /// Blank before; that of the answer if it is proven, else of no meaning.
     pub(in crate::measure) trace: &'a mut Trace,
 }
 

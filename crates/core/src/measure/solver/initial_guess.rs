@@ -16,7 +16,7 @@
 use crate::body::Body;
 use crate::measure::frames::vector::{
     M3, V3, add, add_scaled, apply, apply_symmetric, apply_transposed, cofactors, dot, normalized, rows, scaled,
-    subtract, times_transposed,
+    subtract, times_transposed, turned_symmetric,
 };
 use crate::measure::solver::tangent_newton::Relative;
 use crate::polynomial::{Number, Simd};
@@ -168,14 +168,6 @@ pub(in crate::measure) fn meeting<S: Simd, N: Number<S>>(
     let x = subtract(of_a, apply_symmetric(&turn_a, n));
     let y = add(of_b, apply_symmetric(&turn_b, n));
     (Start { x, y, n }, [cell_a.place, cell_b.place])
-}
-
-/// `R M Rᵀ` of a symmetric matrix with the entries xx, xy, xz, yy, yz, zz.
-#[inline(always)]
-fn turned_symmetric<S: Simd, N: Number<S>>(rotation: &M3<N>, m: &[N; 6]) -> [N; 6] {
-    let [r0, r1, r2] = *rotation;
-    let (m0, m1, m2) = (apply_symmetric(m, r0), apply_symmetric(m, r1), apply_symmetric(m, r2));
-    [dot(r0, m0), dot(r0, m1), dot(r0, m2), dot(r1, m1), dot(r1, m2), dot(r2, m2)]
 }
 
 /// The direction of `n + M⁻¹ r`, by cofactors of the symmetric matrix M with the entries xx, xy,

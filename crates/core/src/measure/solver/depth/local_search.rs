@@ -187,7 +187,8 @@ impl<'a> Best<'a> {
             return false;
         }
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
-        let (mut trace, (a, b)) = (Trace::default(), (pair.a.body, pair.b.body));
+        let (a, b) = (pair.a.body, pair.b.body);
+        let mut trace = Trace::default();
         match dispatch(Seek { a, b, relation, from: None, most, options, trace: &mut trace }) {
             Ok(proven) => {
                 self.take(&proven, trace);

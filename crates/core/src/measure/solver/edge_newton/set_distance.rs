@@ -216,7 +216,8 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         self.run(simd, at, &mut rounds).map_err(|_| rounds)
     }
 
-    /// From the poses alone; none where no plane separates the start from the set, as near contact.
+    /// From the poses alone; none where the body's interior point is in the set, or where the plane
+    /// across the start's normal does not separate it from the set, as near contact.
     #[inline(always)]
     fn seek<S: Simd>(&self, simd: S, center: V3<f64>) -> Option<Iterate> {
         let seen = self.set.offset(simd, center);

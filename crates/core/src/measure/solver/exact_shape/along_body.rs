@@ -64,8 +64,9 @@ impl<P: Projectable> WithSimd for AlongBody<'_, P> {
     }
 }
 
-/// Tangential parts of a step after one of Newton's for its residual; none where the body does not
-/// face the set there. `smallest` (per metre) is added to the curvature that is divided by.
+/// α after a step of Newton's method for the residual, with the set as seen from where α has led;
+/// none where the body does not face the set there, or where the residual's derivative is not
+/// positive. `smallest` (per metre) is added to the curvature that is divided by.
 #[inline(always)]
 fn corrected<S: Simd>(
     _: S,

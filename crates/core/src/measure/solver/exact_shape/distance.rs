@@ -162,8 +162,9 @@ impl<P: Projectable> WithSimd for ExactPair<'_, P> {
 }
 
 impl<P: Projectable> ExactPair<'_, P> {
-    /// From the poses alone; none where the body's interior point is in the set, or where no plane
-    /// separates the start from it, as near contact.
+    /// From the poses alone; none where the body's interior point is in the set, or where the plane
+    /// across the start's normal does not separate it from the set, as near contact. Of thin bodies
+    /// it is enough that the start lies outside of the set and faces it.
     #[inline(always)]
     fn seek<S: Simd>(&self, simd: S, side: &Side<'_, f64>, center: V3<f64>, rounds: &mut u32) -> Option<Guess> {
         let seen = self.set.offset(simd, center);

@@ -12,10 +12,10 @@
 //!
 //! with the straightened constraint of [`super::super::tangent_newton::newton`].
 //!
-//! Where the step leads to another feature of the set, K is that of the wrong one. Then the point of
-//! the set is left free: about the foot `f = x + a n` the body's surface is `f + E α` with
-//! `E = T - n rᵀ`, but for its curvature, which counts D times, the distance of f. The α nearest to
-//! a point y of the set, and half the square of that distance, are
+//! Where the step leads to another feature of the set, or into it, K is that of the wrong one. Then
+//! the point of the set is left free: about the foot `f = x + a n` the body's surface is `f + E α`
+//! with `E = T - n rᵀ`, but for its curvature, which counts D times, the distance of f. The α
+//! nearest to a point y of the set, and half the square of that distance, are
 //!
 //! ```text
 //! α = -B⁻¹ Eᵀ (f - y),   (f - y)ᵀ M (f - y) / 2,   B = EᵀE + D W,   M = I - E B⁻¹ Eᵀ,
@@ -28,8 +28,7 @@ use crate::measure::frames::vector::{V3, add_scaled, apply_symmetric, dot, scale
 use crate::measure::solver::tangent_newton::{Plane, SurfaceCurvature, Symmetric2, moved};
 use crate::polynomial::Simd;
 
-/// Least part of the distance, dimensionless, that the body's curvature counts with after the part
-/// of a step along the normal.
+/// Least D relative to the distance of x, dimensionless.
 ///
 /// Larger, steps near contact are shorter than they have to be; smaller, the curvature of a body
 /// that is about to reach the set counts for nothing, or against it. It changes time only; no test
@@ -107,27 +106,34 @@ pub(super) fn newton<S: Simd, P: Projectable>(
     let compliance = scaled::<S, f64>([k11, -k01, k00], inverse);
     let frame = &from.frame;
     let mut next = set.offset(simd, moved::<S, f64>(x, of_body.step(alpha), frame));
-    if next.feature != from.feature {
-        alpha = free_of_features(simd, set, (x, from), &of_body);
+    if next.feature != from.feature
+        && let Some(free) = free_of_features(simd, set, (x, from), &of_body)
+    {
+        alpha = free;
         next = set.offset(simd, moved::<S, f64>(x, of_body.step(alpha), frame));
     }
     Some(Move { step: of_body.step(alpha), next, shift, compliance })
 }
 
-/// Tangential parts of a step from x that leaves the point of the set free.
+/// Tangential parts of a step from x that leaves the point of the set free; none where B is not
+/// positive definite.
 #[inline(always)]
 fn free_of_features<S: Simd, P: Projectable>(
     simd: S,
     set: &P,
     (x, from): (V3<f64>, &Offset),
     of_body: &Linearized,
-) -> [f64; 2] {
+) -> Option<[f64; 2]> {
     let [t0, t1, n] = from.frame;
     let Linearized { r, w, shift, .. } = *of_body;
     let depth = (from.distance + shift).max(NEAREST * from.distance);
     let (b00, b01, b11) =
         (1.0 + r[0] * r[0] + depth * w[0], r[0] * r[1] + depth * w[1], 1.0 + r[1] * r[1] + depth * w[2]);
-    let inverse = 1.0 / (b00 * b11 - b01 * b01);
+    let determinant = b00 * b11 - b01 * b01;
+    if !(b00 > 0.0 && determinant > 0.0) {
+        return None;
+    }
+    let inverse = 1.0 / determinant;
     let (e0, e1) = (add_scaled::<S, f64>(t0, -r[0], n), add_scaled::<S, f64>(t1, -r[1], n));
     // The rows of B⁻¹ Eᵀ.
     let row = |a: f64, b: f64| scaled::<S, f64>(add_scaled::<S, f64>(scaled::<S, f64>(e0, a), b, e1), inverse);
@@ -135,11 +141,10 @@ fn free_of_features<S: Simd, P: Projectable>(
     let entry = |i: usize, j: usize| (if i == j { 1.0 } else { 0.0 }) - e0[i] * f0[j] - e1[i] * f1[j];
     let metric = [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)];
     let foot = add_scaled::<S, f64>(x, shift, n);
-    let y = add_scaled::<S, f64>(x, -from.distance, n);
-    let v = scaled::<S, f64>(n, from.distance + shift);
-    let gradient = scaled::<S, f64>(apply_symmetric::<S, f64>(&metric, v), -1.0);
+    let y = set.project(simd, x);
+    let gradient = apply_symmetric::<S, f64>(&metric, subtract::<S, f64>(y, foot));
     let v = subtract::<S, f64>(foot, set.least(simd, y, gradient, &metric));
-    [-dot::<S, f64>(f0, v), -dot::<S, f64>(f1, v)]
+    Some([-dot::<S, f64>(f0, v), -dot::<S, f64>(f1, v)])
 }
 
 #[cfg(test)]
@@ -150,9 +155,9 @@ mod tests {
     use nalgebra::{Matrix2, Matrix3x2, Vector2, Vector3};
     use sublevel_testkit::Seeded;
 
-    /// The least sum of what α and the point of the set cost, found by turns: for a point of the set
-    /// the best α, for that the nearest point of the set. Walls of cylinders are round, which a
-    /// quadratic over the set follows in part.
+    /// The least sum of what α and the point of the set cost, found by turns: for a point of the
+    /// set the best α, for that the nearest point of the set. Walls of cylinders are round, which
+    /// a quadratic over the set follows in part.
     #[test]
     fn steps_that_leave_the_point_of_the_set_free_are_those_of_alternating_projections() {
         let half_extents = [0.4, 0.3, 0.2];
@@ -170,7 +175,8 @@ mod tests {
             if !(from.distance > 1e-3) {
                 continue;
             }
-            // Bodies from needles to plates, and a point within a tenth of the distance of the surface.
+            // Bodies from needles to plates, and a point within a tenth of the distance of the
+            // surface.
             let mut of_axis = || 10_f64.powf(2.0 * random.signed());
             let curved = [(); 2].map(|()| of_axis());
             let turned = nalgebra::Rotation2::new(3.0 * random.signed());
@@ -183,7 +189,8 @@ mod tests {
                 r: r.into(),
                 w: [w.m11, w.m12, w.m22],
             };
-            let alpha = Vector2::from(free_of_features(Scalar, set, (x, &from), &of_body));
+            let alpha = free_of_features(Scalar, set, (x, &from), &of_body).expect("curved");
+            let alpha = Vector2::from(alpha);
             let [t0, t1, n] = from.frame.map(Vector3::from);
             let (foot, e) =
                 (Vector3::from(x) + of_body.shift * n, Matrix3x2::from_columns(&[t0 - r.x * n, t1 - r.y * n]));
@@ -203,6 +210,7 @@ mod tests {
                 least = next;
             }
             let (at_rest, reached, wanted) = (cost(&Vector2::zeros()).0, cost(&alpha).0, cost(&least).0);
+            assert!(reached.is_finite(), "{name}, seed {seed}");
             count += 1;
             if reached <= wanted + more * at_rest {
                 best += 1;
@@ -211,6 +219,6 @@ mod tests {
         }
         println!("{name}: {best} of {count} best, others cost up to {worst:.3} of a step of 0 more");
         assert!(f64::from(best) >= share * f64::from(count), "{name}: {best} of {count}");
-        assert!(worst < 1.0, "{name}: {worst}");
+        assert!(count > 1000 && worst < 0.6, "{name}: {worst}");
     }
 }

@@ -1,5 +1,6 @@
 //! The segment of the z axis, which capsules are balls about, and the point.
 
+use super::cuboid::FLATTEST;
 use super::projectable::{ON, Offset, Projectable};
 use crate::measure::frames::vector::{V3, basis, dot};
 use crate::polynomial::Simd;
@@ -84,7 +85,7 @@ impl Projectable for Segment {
 
     #[inline(always)]
     fn least<S: Simd>(&self, simd: S, y: V3<f64>, gradient: V3<f64>, hessian: &[f64; 6]) -> V3<f64> {
-        self.project(simd, [0.0, 0.0, y[2] - gradient[2] / hessian[5]])
+        self.project(simd, [0.0, 0.0, y[2] - gradient[2] / hessian[5].max(FLATTEST)])
     }
 
     #[inline(always)]

@@ -33,7 +33,7 @@ pub(super) struct ThinEllipsoid<'a, P> {
 }
 
 impl<P: Projectable> WithSimd for ThinEllipsoid<'_, P> {
-    /// The set's normal about there.
+    /// The ellipsoid's inward normal there, which is the set's.
     type Output = V3<f64>;
 
     #[inline(always)]

@@ -1,4 +1,5 @@
-//! Newton's step in lanes; derived in [`super::super::newton`].
+//! Newton's step in lanes; derived in [`super::super::newton`], corrections for other features in
+//! [`super::super::along_body`].
 
 use super::set::{LaneOffset, LaneSet};
 use crate::measure::frames::vector::{V3, add, add_scaled, dot, scaled};
