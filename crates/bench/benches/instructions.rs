@@ -2,7 +2,7 @@
 //! change.
 //!
 //! `.ci/instructions` runs it: each row in a process of its own, on the AVX2 path (valgrind knows
-//! no AVX-512), on two fitted bodies that are kept beside this file and on shapes, in poses that
+//! no AVX-512), on three fitted bodies kept beside this file and on shapes, in poses that
 //! depend on nothing. The counts are compared with those recorded in `benches/instructions.json`;
 //! they belong to one version of the compiler, which is recorded with them.
 
@@ -46,12 +46,14 @@ enum Where {
     NearHuman,
     /// The chair and the box, likewise.
     NearBox,
+    /// The chair and the human that slabs cut, likewise.
+    NearCut,
 }
 
-use Where::{Apart, NearBox, NearHuman};
+use Where::{Apart, NearBox, NearCut, NearHuman};
 
 /// The rows; those that are not warm forget the pose before.
-const ROWS: [(&str, bool, Where, Solve); 13] = [
+const ROWS: [(&str, bool, Where, Solve); 16] = [
     ("distance_warm", true, Apart, solve_distance),
     ("distance_cold", false, Apart, solve_distance),
     ("distance_near", false, NearHuman, solve_distance),
@@ -62,6 +64,9 @@ const ROWS: [(&str, bool, Where, Solve); 13] = [
     ("box_near", false, NearBox, solve_box),
     ("two_boxes_cold", false, Apart, solve_boxes),
     ("capsule_warm", true, Apart, solve_capsule),
+    ("cut_warm", true, Apart, solve_cut),
+    ("cut_cold", false, Apart, solve_cut),
+    ("cut_near", false, NearCut, solve_cut),
     ("overlap_apart", false, Apart, decide_overlap),
     ("overlap_near", false, NearHuman, decide_overlap),
     ("overlap_box_near", false, NearBox, decide_overlap_of_box),
@@ -88,6 +93,8 @@ struct Args {
 struct Bodies {
     chair: Body,
     human: Body,
+    /// The human, cut by six slabs.
+    cut: Body,
     /// About as large as the human, and as the chair.
     boxes: [Body; 2],
     capsule: Capsule,
@@ -113,8 +120,10 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
         return run(&row).map(|()| ExitCode::SUCCESS);
     }
     if args.fit {
-        for (name, shape) in [("chair", shapes::chair()), ("human", shapes::human())] {
-            let options = FitOptions { degree: 6, input: format!("{name}.off"), ..FitOptions::default() };
+        for (name, shape, slabs) in
+            [("chair", shapes::chair(), 0), ("human", shapes::human(), 0), ("human-cut", shapes::human(), 6)]
+        {
+            let options = FitOptions { degree: 6, slabs, input: format!("{name}.off"), ..FitOptions::default() };
             let body = fit(name, &shape.vertices, &options, &mut |_| ControlFlow::Continue(()))?.body;
             write(&body_file(name), &body.to_json())?;
         }
@@ -204,9 +213,13 @@ fn run(row: &str) -> Result<(), Box<dyn Error>> {
         Body::cuboid("locker", Vector3::new(0.25, 0.2, 0.9))?.moved(&UnitQuaternion::identity(), &MIDDLE)?,
         Body::cuboid("crate", Vector3::new(0.4, 0.4, 0.5))?,
     ];
-    let bodies = Bodies { chair: load("chair")?, human: load("human")?, boxes, capsule };
+    let bodies = Bodies { chair: load("chair")?, human: load("human")?, cut: load("human-cut")?, boxes, capsule };
     let mut poses = poses()?;
-    let other = if place == NearBox { &bodies.boxes[0] } else { &bodies.human };
+    let other = match place {
+        NearBox => &bodies.boxes[0],
+        NearCut => &bodies.cut,
+        Apart | NearHuman => &bodies.human,
+    };
     // Once uncounted, to see that each is what it is meant to be: bodies apart, and converged.
     for (k, pose) in poses.iter_mut().enumerate() {
         let to = |pose: &Pose| {
@@ -256,6 +269,11 @@ fn solve_level_distance(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (
 
 fn solve_box(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
     let answer = distance(&bodies.chair, &Pose::identity(), &bodies.boxes[0], pose, &Options::default(), warm);
+    (answer.status, answer.iterations)
+}
+
+fn solve_cut(bodies: &Bodies, pose: &Pose, warm: &mut WarmStart) -> (Status, u32) {
+    let answer = distance(&bodies.chair, &Pose::identity(), &bodies.cut, pose, &Options::default(), warm);
     (answer.status, answer.iterations)
 }
 

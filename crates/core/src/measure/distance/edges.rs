@@ -5,7 +5,7 @@ use super::query::Query;
 use crate::body::Body;
 use crate::measure::frames::pose::Pose;
 use crate::measure::solver::continuation::Lost;
-use crate::measure::solver::edge_newton::{EdgeProven, EdgeQuery};
+use crate::measure::solver::edge_newton::{EdgeProven, EdgeQuery, EdgeStart, EdgeTrace};
 use crate::measure::solver::initial_guess::Start;
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -22,10 +22,19 @@ use nalgebra::{Matrix3, Vector3};
 pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<Distance, Lost> {
     let Query { of_a: (a, pose_a), of_b: (b, pose_b), goal, options, .. } = *query;
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-    let trace = if let Hint::Edges(trace) = &warm.hint { Some(trace) } else { None };
-    let start = start((a, pose_a), pose_b, &warm.hint);
-    let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, trace, start })?;
-    *warm = Hint::Edges(found.trace).into();
+    let witnesses = witnesses((a, pose_a), pose_b, &warm.hint);
+    let mut place;
+    let (start, trace) = match &mut warm.hint {
+        Hint::Edges(trace) => (Some(EdgeStart::Last), trace),
+        _ => {
+            place = EdgeTrace::default();
+            (witnesses.map(EdgeStart::Witnesses), &mut place)
+        }
+    };
+    let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, start, trace })?;
+    if !matches!(start, Some(EdgeStart::Last)) {
+        *warm = Hint::Edges(*trace).into();
+    }
     let narrow = found.upper - found.lower <= tolerance;
     if narrow || goal.met(found.lower, found.upper) {
         Ok(answer((a, pose_a), &found, narrow))
@@ -36,7 +45,7 @@ pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<Distan
 
 /// What the general search has found.
 #[inline(always)]
-fn start((a, pose_a): (&Body, &Pose), pose_b: &Pose, hint: &Hint) -> Option<Start<f64>> {
+fn witnesses((a, pose_a): (&Body, &Pose), pose_b: &Pose, hint: &Hint) -> Option<Start<f64>> {
     let Hint::Apart { x_a, y_b, normal_a, .. } = hint else { return None };
     let center = a.normalization().center;
     let y = pose_a.rotation().inverse_transform_vector(&(pose_b.transform_point(y_b) - pose_a.translation()));

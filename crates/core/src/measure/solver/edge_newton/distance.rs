@@ -42,7 +42,7 @@ pub(super) const FLATTEST: f64 = 1e-10;
 const LEAST_DISTANCE: f64 = 1e-8;
 
 /// What is kept of an answer for the next query of the pair.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(in crate::measure) struct EdgeTrace {
     of_a: Spot,
     of_b: Spot,
@@ -80,7 +80,6 @@ pub(in crate::measure) struct EdgeProven {
     pub(in crate::measure) active_b: ActiveConstraints,
     /// Evaluations of both bodies.
     pub(in crate::measure) rounds: u32,
-    pub(in crate::measure) trace: EdgeTrace,
 }
 
 /// The distance of two bodies that are apart.
@@ -93,10 +92,19 @@ pub(in crate::measure) struct EdgeQuery<'a> {
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
     pub(in crate::measure) options: &'a Options<'a>,
-    /// Of the answer before.
-    pub(in crate::measure) trace: Option<&'a EdgeTrace>,
-    /// Where to start without one; else where the outlines are nearest.
-    pub(in crate::measure) start: Option<Start<f64>>,
+    /// Where to start; else where the outlines are nearest.
+    pub(in crate::measure) start: Option<EdgeStart>,
+    /// Replaced by that of the answer where it is proven.
+    pub(in crate::measure) trace: &'a mut EdgeTrace,
+}
+
+/// Where Newton's method for two bodies starts.
+#[derive(Clone, Copy)]
+pub(in crate::measure) enum EdgeStart {
+    /// From the answer before, which the trace is of.
+    Last,
+    /// From about the nearest points.
+    Witnesses(Start<f64>),
 }
 
 /// Trial points in the query frame, the basis whose third vector is the trial normal, and the
@@ -120,15 +128,15 @@ impl WithSimd for EdgeQuery<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { a, pose_a, b, pose_b, goal, tolerance, options, trace, start } = self;
+        let Self { a, pose_a, b, pose_b, goal, tolerance, options, start, trace } = self;
         let relation = Apart { pose_a, pose_b, goal, tolerance, facing: None };
         let relative = relation.relative(simd, a, b);
         let sides = (Side::at_home(simd, a, 0), Side::away(simd, b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };
         let mut rounds = 0;
-        let mut following = match trace {
-            Some(trace) => solver.follow(simd, &relative, trace),
-            None => None,
+        let mut following = match start {
+            Some(EdgeStart::Last) => solver.follow(simd, &relative, trace),
+            _ => None,
         };
         // From the last answer, and if that fails from the poses alone.
         loop {
@@ -136,8 +144,8 @@ impl WithSimd for EdgeQuery<'_> {
                 Some((at, predicted)) => (at, Some(predicted)),
                 None => {
                     let start = match start {
-                        Some(start) => start,
-                        None => relation.start(simd, a, b, &relative).0,
+                        Some(EdgeStart::Witnesses(start)) => start,
+                        _ => relation.start(simd, a, b, &relative).0,
                     };
                     let height = dot::<S, f64>(start.n, subtract::<S, f64>(start.x, start.y));
                     if let Some(lower) = relation.parted((a, b), &relative, start.n, height) {
@@ -153,18 +161,19 @@ impl WithSimd for EdgeQuery<'_> {
                     (Iterate { x: start.x, y: start.y, frame: basis(simd, start.n), active }, None)
                 }
             };
-            match solver.run(simd, &relative, at, &mut rounds) {
-                Ok(mut proven) => {
-                    if let (Some(predicted), Some(trace)) = (predicted, trace) {
-                        let from_b = subtract::<S, f64>(proven.y, relative.origin);
-                        let missed = [
-                            subtract::<S, f64>(proven.x, predicted[0]),
-                            subtract::<S, f64>(apply_transposed::<S, f64>(&relative.rotation, from_b), predicted[1]),
-                            subtract::<S, f64>(proven.n, predicted[2]),
-                        ];
-                        proven.trace.drift = trace.drift;
-                        proven.trace.drift.update(simd, missed);
-                    }
+            match solver.run(simd, &relative, at, (&mut rounds, trace)) {
+                Ok(proven) => {
+                    let Some([x, own_y, n]) = predicted else {
+                        trace.drift = Drift::default();
+                        return Ok(proven);
+                    };
+                    let from_b = subtract::<S, f64>(proven.y, relative.origin);
+                    let missed = [
+                        subtract::<S, f64>(proven.x, x),
+                        subtract::<S, f64>(apply_transposed::<S, f64>(&relative.rotation, from_b), own_y),
+                        subtract::<S, f64>(proven.n, n),
+                    ];
+                    trace.drift.update(simd, missed);
                     return Ok(proven);
                 }
                 Err(lost) if lost.common.is_some() || lost.parted.is_some() || predicted.is_none() => return Err(lost),
@@ -214,7 +223,7 @@ impl Solver<'_> {
         Some((at, [x, own_y, n]))
     }
 
-    /// Newton's method until the bracket is narrow.
+    /// Newton's method until the bracket is narrow, which the trace is then of.
     ///
     /// # Errors
     /// What is left.
@@ -226,7 +235,7 @@ impl Solver<'_> {
         simd: S,
         relative: &Relative<f64>,
         mut at: Iterate,
-        rounds: &mut u32,
+        (rounds, trace): (&mut u32, &mut EdgeTrace),
     ) -> Result<EdgeProven, Lost> {
         let (side_a, side_b) = &self.sides;
         let mut contacts = 0;
@@ -281,7 +290,8 @@ impl Solver<'_> {
                 }
             }
             if prospect == Prospect::Decided || near {
-                match self.prove(simd, relative, &at, &found, [(&of_a, &local_a), (&of_b, &local_b)], difference) {
+                let evaluated = [(&of_a, &local_a), (&of_b, &local_b)];
+                match self.prove(simd, relative, &at, &found, (evaluated, difference), trace) {
                     Ok(proven) => return Ok(EdgeProven { rounds: *rounds, ..proven }),
                     Err(touching) => contacts += u32::from(touching),
                 }
@@ -384,7 +394,7 @@ impl Solver<'_> {
         None
     }
 
-    /// The answer where the step leads.
+    /// The answer where the step leads, which the trace is then of.
     ///
     /// # Errors
     /// There is none; whether that is because the bodies seem to touch.
@@ -397,8 +407,8 @@ impl Solver<'_> {
         relative: &Relative<f64>,
         at: &Iterate,
         found: &Found,
-        [(of_a, local_a), (of_b, local_b)]: [(&Evaluated, &M3<f64>); 2],
-        difference: V3<f64>,
+        ([(of_a, local_a), (of_b, local_b)], difference): ([(&Evaluated, &M3<f64>); 2], V3<f64>),
+        trace: &mut EdgeTrace,
     ) -> Result<EdgeProven, bool> {
         let (side_a, side_b) = &self.sides;
         let (a, b) = (side_a.body(), side_b.body());
@@ -439,11 +449,12 @@ impl Solver<'_> {
         let n = apply_transposed::<S, f64>(&at.frame, proven.normal);
         let own_y = apply_transposed::<S, f64>(&relative.rotation, subtract::<S, f64>(y, relative.origin));
         let [multiplier_a, multiplier_b] = proven.multipliers;
-        let of_a = Spot::new(simd, x, weighted_a.times(multiplier_a), (of_a, delta_a));
-        let of_b = Spot::new(simd, own_y, weighted_b.times(multiplier_b), (of_b, delta_b));
-        let (active_a, active_b) = (of_a.active.reported(), of_b.active.reported());
-        let trace = EdgeTrace { of_a, of_b, n, drift: Drift::default() };
-        Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0, trace })
+        let (active_a, active_b) = (weighted_a.times(multiplier_a), weighted_b.times(multiplier_b));
+        trace.of_a = Spot::new(simd, x, active_a, (of_a, delta_a));
+        trace.of_b = Spot::new(simd, own_y, active_b, (of_b, delta_b));
+        trace.n = n;
+        let (active_a, active_b) = (active_a.reported(), active_b.reported());
+        Ok(EdgeProven { lower, upper, x, y, n, active_a, active_b, rounds: 0 })
     }
 }
 

@@ -35,6 +35,6 @@ mod set_distance;
 mod share_inside;
 mod spot;
 
-pub(in crate::measure) use distance::{EdgeProven, EdgeQuery, EdgeTrace};
+pub(in crate::measure) use distance::{EdgeProven, EdgeQuery, EdgeStart, EdgeTrace};
 pub(in crate::measure) use farthest::FarthestOfEdges;
 pub(in crate::measure) use set_distance::{EdgeShapeProven, EdgeShapeQuery, EdgeShapeStart, EdgeShapeTrace};

@@ -6,7 +6,7 @@ use crate::measure::solver::active_constraints::MAX_ACTIVE;
 use crate::polynomial::{NumberJet, Simd};
 
 /// A witness with the constraints that are active there, for the next query of the pair.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Spot {
     /// From the centre of the normalization on, body frame, metres.
     pub(super) point: V3<f64>,
