@@ -23,10 +23,9 @@ pub(in crate::measure) fn ball_gap((a, pose_a): (&Body, &Pose), (b, pose_b): (&B
     apart - reach - 8.0 * f64::EPSILON * (apart + reach) - error
 }
 
-/// Bracket of a distance, metres, with points that attain its upper bound; world frame.
+/// Upper bound of a distance, metres, with points that attain it; world frame.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::measure) struct BallBounds {
-    pub(in crate::measure) lower: f64,
+pub(in crate::measure) struct InnerGap {
     /// 0 where balls inside both bodies have a point in common.
     pub(in crate::measure) upper: f64,
     pub(in crate::measure) witness_a: Vector3<f64>,
@@ -35,9 +34,8 @@ pub(in crate::measure) struct BallBounds {
     pub(in crate::measure) normal: Option<Vector3<f64>>,
 }
 
-/// Bracket of the distance from the circumscribed balls and those about the interior points inside.
-pub(in crate::measure) fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> BallBounds {
-    let lower = ball_gap((a, pose_a), (b, pose_b));
+/// Upper bound of the distance from the balls about the interior points inside both bodies.
+pub(in crate::measure) fn inner_gap((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body, &Pose)) -> InnerGap {
     let (vector, apart, error) = across((pose_a, a.interior_point()), (pose_b, b.interior_point()));
     let reach = a.in_radius() + b.in_radius();
     let upper = apart - reach + 8.0 * f64::EPSILON * (apart + reach) + error;
@@ -49,7 +47,7 @@ pub(in crate::measure) fn balls((a, pose_a): (&Body, &Pose), (b, pose_b): (&Body
         let common = from_a - vector * (a.in_radius() / reach);
         (common, common, None)
     };
-    BallBounds { lower: lower.max(0.0), upper: upper.max(0.0), witness_a, witness_b, normal }
+    InnerGap { upper: upper.max(0.0), witness_a, witness_b, normal }
 }
 
 /// Relative slack of cheap bounds, dimensionless: many times their rounding, which is a few units
@@ -80,8 +78,8 @@ mod tests {
             let (pose_a, pose_b) = (random_pose(&mut random, 0.1), random_pose(&mut random, far));
             let mut warm = WarmStart::default();
             let truth = distance(a, &pose_a, b, &pose_b, &Options::default(), &mut warm);
-            let bound = balls((a, &pose_a), (b, &pose_b));
-            assert!(bound.lower <= truth.upper, "seed {seed}");
+            assert!(ball_gap((a, &pose_a), (b, &pose_b)) <= truth.upper, "seed {seed}");
+            let bound = inner_gap((a, &pose_a), (b, &pose_b));
             assert!(bound.upper >= truth.lower, "seed {seed}");
             let apart = (bound.witness_a - bound.witness_b).norm();
             assert!((apart - bound.upper).abs() < 1e-12 * (1.0 + far), "seed {seed}: {bound:?}");

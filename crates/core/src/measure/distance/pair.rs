@@ -8,7 +8,7 @@ use super::planes::planes_between;
 use super::query::Query;
 use super::search::Search;
 use crate::body::{Body, ClosedForm};
-use crate::measure::bounds::culling::{BallBounds, balls};
+use crate::measure::bounds::culling::{InnerGap, ball_gap, inner_gap};
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::query_frame::Pair;
 use crate::measure::frames::vector::V3;
@@ -44,13 +44,20 @@ pub(in crate::measure) fn settle(
     if goal.is_narrow() || is_beside_ball && runs(Stage::ClosedForm) {
         return between(of_a, of_b, goal, options, warm);
     }
-    let BallBounds { lower, upper, witness_a, witness_b, normal } = balls(of_a, of_b);
-    let mut bound = Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() };
-    if !runs(Stage::Balls) {
-        (bound.lower, bound.upper) = (0.0, f64::INFINITY);
-    }
+    let has_balls = runs(Stage::Balls);
+    let gap = if has_balls { ball_gap(of_a, of_b) } else { 0.0 };
+    let mut bound = Distance { lower: gap.max(0.0), ..Distance::default() };
     if goal.met(bound.lower, bound.upper) {
         return bound;
+    }
+    // Balls inside decide where bodies are deep in each other, planes where they are apart.
+    let [size_a, size_b] = [of_a.0, of_b.0].map(|body| body.circumscribed().radius - body.in_radius());
+    let is_deep = gap < -(size_a + size_b);
+    if is_deep && has_balls {
+        bound = within_inner_balls(bound.lower, of_a, of_b);
+        if goal.met(bound.lower, bound.upper) {
+            return bound;
+        }
     }
     let mut query = Query { of_a, of_b, goal, options, facing: None };
     if let Some(found) = query.still_overlapping(warm) {
@@ -59,6 +66,12 @@ pub(in crate::measure) fn settle(
     if runs(Stage::Planes) {
         let planes = planes_between(of_a, of_b, &warm.hint, goal);
         (bound.lower, query.facing) = (bound.lower.max(planes.lower), planes.facing);
+        if goal.met(bound.lower, bound.upper) {
+            return bound;
+        }
+    }
+    if !is_deep && has_balls {
+        bound = within_inner_balls(bound.lower, of_a, of_b);
         if goal.met(bound.lower, bound.upper) {
             return bound;
         }
@@ -94,6 +107,13 @@ pub(in crate::measure) fn settle(
     // A search that stopped early may know less than the bounds it came after.
     let upper = if found.upper <= bound.upper { found } else { bound };
     Distance { lower: found.lower.max(bound.lower), status: found.status, iterations: found.iterations, ..upper }
+}
+
+/// What balls inside both bodies show, with a lower bound, metres, that is known.
+#[inline(always)]
+fn within_inner_balls(lower: f64, of_a: (&Body, &Pose), of_b: (&Body, &Pose)) -> Distance {
+    let InnerGap { upper, witness_a, witness_b, normal } = inner_gap(of_a, of_b);
+    Distance { lower, upper, witness_a, witness_b, normal, ..Distance::default() }
 }
 
 /// Distance of two bodies, or as much of it as the goal needs.
