@@ -49,8 +49,11 @@ const OUTSIDE: f64 = 1e-2;
 
 /// Turn of the normal, radians, that counts as none: rounding of the points that it is across.
 ///
-/// Larger, normals of rims of less than a thousandth of that length could be off by more than 1e-7;
-/// smaller, rays through edges are left to the general search.
+/// Beside an edge of the sum normals turn by the distance of the ray from the edge over
+/// [`OUTSIDE`], plane after plane, however fast they settle along the edge. Larger, rays that far
+/// from an edge get a normal of the edge in place of that of its side: with 7e-8 one of 5 000 pairs
+/// was off by 30 degrees. Smaller, rays through edges are left to the general search. Pinned by
+/// seed 206 801 of `family_20_growth_gradients`.
 const AT_REST: f64 = 1e-3 * ALIGNED;
 
 /// Most planes that are tried.
@@ -208,7 +211,7 @@ fn of_any(
         form_a.height(&own(pose_a)) + form_b.height(&own(pose_b)) + turned * (reaches[0] + reaches[1])
     };
     let mut nearest = start.map(|start| start - pose_a.translation() - arm_a);
-    let (mut normal, mut last_turn, mut steps) = (vector / distance, f64::INFINITY, 0);
+    let (mut normal, mut steps) = (vector / distance, 0);
     for plane in 1..=MOST_PLANES {
         // Where the ray meets the plane the shapes are apart or touch.
         let center = vector * (width(&normal) / normal.dot(&vector)) + normal * gap;
@@ -222,10 +225,7 @@ fn of_any(
             break;
         }
         let turn = (found.normal - normal).norm();
-        // As a geometric series that goes on like the last two turns.
-        let left = if turn == 0.0 { 0.0 } else { turn * turn / (last_turn - turn) };
-        let is_aligned = turn <= AT_REST || (0.0..=0.5 * ALIGNED).contains(&left);
-        if is_aligned && (plane > 1 || turn == 0.0) {
+        if turn <= AT_REST && (plane > 1 || turn == 0.0) {
             let normal = found.normal;
             let width = width(&normal);
             let lower = (normal.dot(&vector) - vector_error) / width * (1.0 - gamma(8));
@@ -233,7 +233,7 @@ fn of_any(
             return place.grown((of_a, radii), (vector, vector_error), lower).ok_or(steps);
         }
         nearest = Some(found.witness_a - center);
-        (normal, last_turn) = (found.normal, turn);
+        normal = found.normal;
     }
     Err(steps)
 }
