@@ -51,8 +51,8 @@ pub(in crate::measure) fn settle(
         return bound;
     }
     // Balls inside decide where bodies are deep in each other, planes where they are apart.
-    let [size_a, size_b] = [of_a.0, of_b.0].map(|body| body.circumscribed().radius - body.in_radius());
-    let is_deep = gap < -(size_a + size_b);
+    let [shell_a, shell_b] = [of_a.0, of_b.0].map(|body| body.circumscribed().radius - body.in_radius());
+    let is_deep = gap < -(shell_a + shell_b);
     if is_deep && has_balls {
         bound = within_inner_balls(bound.lower, of_a, of_b);
         if goal.met(bound.lower, bound.upper) {
