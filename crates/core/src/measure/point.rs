@@ -39,8 +39,7 @@ pub struct PointDistance {
     pub status: Status,
     /// Proven lower bound; 0 when the point is not proven outside.
     pub lower: f64,
-    /// Proven upper bound, which the witness attains within the accuracy asked for; 0 when the
-    /// point is proven inside.
+    /// Proven upper bound, which the witness attains; 0 when the point is proven inside.
     pub upper: f64,
     /// Whether the point is proven to lie in the body; the distance is then 0, and depth is not
     /// measured.
@@ -174,7 +173,7 @@ pub(super) struct Projected {
     pub(super) plane: Vector3<f64>,
     /// About the normal of the surface at the witness, of length 1.
     pub(super) normal: Vector3<f64>,
-    /// Attains the upper bound, or one that is as near to the lower bound as asked for.
+    /// Attains the upper bound.
     pub(super) witness: Vector3<f64>,
     /// The point itself, or that of the segment nearest to the witness; one that lies in the body
     /// where the upper bound is 0.
@@ -302,7 +301,9 @@ impl<'a> Projection<'a> {
             _ => Start { y: single.table(&objective), active: 0 },
         };
         let (mut lower, mut upper, mut plane, mut witness) = (0.0_f64, f64::INFINITY, Vector3::zeros(), body.interior);
-        let mut facing: Option<(f64, Vector3<f64>)> = None;
+        // Of the point that its normal leads from to the segment best: how much that is off, the
+        // normal, and how far it is.
+        let mut facing: Option<(f64, Vector3<f64>, f64)> = None;
         let narrow = tolerance / unit;
         let in_metres = |bound: f64, side: f64| bound * unit * (1.0 + side * 4.0 * f64::EPSILON);
         let problem = SingleProblem { body, objective: &objective, start, other: None, narrow };
@@ -326,8 +327,8 @@ impl<'a> Projection<'a> {
             // the surface's normal leads to the point.
             if !self.is_rough && n != Vector3::zeros() && apart - lower <= narrow {
                 let off = (n - (nearest - y) / (nearest - y).norm()).norm();
-                if facing.is_none_or(|(least, _)| off < least) {
-                    (facing, witness) = (Some((off, n)), y);
+                if facing.is_none_or(|(least, ..)| off < least) {
+                    (facing, witness) = (Some((off, n, apart)), y);
                 }
             }
             if apart < upper {
@@ -338,7 +339,7 @@ impl<'a> Projection<'a> {
                 return Worth::Done;
             }
             match upper - lower <= narrow {
-                true if self.is_rough || facing.is_some_and(|(off, _)| off <= FACING) => Worth::Done,
+                true if self.is_rough || facing.is_some_and(|(off, ..)| off <= FACING) => Worth::Done,
                 true => Worth::Narrow,
                 false => Worth::Wide,
             }
@@ -346,7 +347,9 @@ impl<'a> Projection<'a> {
         if let Some(common) = common {
             return Projected::inside(&segment.nearest(&single.to_world(&common)), spent + iterations);
         }
-        let normal = facing.map_or(plane, |(_, n)| n);
+        let normal = facing.map_or(plane, |(_, n, _)| n);
+        // As narrow as asked for, too, and what the witness attains.
+        upper = facing.map_or(upper, |(.., apart)| apart);
         if upper == f64::INFINITY {
             // Stopped before the first trial point: the interior point is a point of the body.
             upper = (q.nearest(&witness) - witness).norm() + body.displacement(&witness) + error;

@@ -112,10 +112,13 @@ impl<'a> RefinedAxis<'a> {
     ) -> Refined {
         let (mut width, mut at) = (upper - lower, None);
         let steps = self.run(near, options.max_iterations(), |found| {
-            (lower, upper) = (lower.max(found.lower), upper.min(found.upper));
+            lower = lower.max(found.lower);
             let own = found.upper - found.lower;
+            // The upper bound stays the one that the points of the answer attain.
             if own.is_finite() && own <= width {
-                (width, at) = (own, Some(*found));
+                (width, upper, at) = (own, found.upper, Some(*found));
+            } else if width == f64::INFINITY {
+                upper = upper.min(found.upper);
             }
             upper - lower <= tolerance && found.aligned || options.stopped()
         });
