@@ -20,7 +20,7 @@ use crate::measure::solver::exact_shape::{ShapeContact, contact_of_shapes};
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
-use crate::measure::solver::tangent_newton::{SEEK_ROUNDS, Side};
+use crate::measure::solver::tangent_newton::{ALIGNED, SEEK_ROUNDS, Side};
 use crate::measure::solver::two_point_problem::{Apart, Relation};
 use crate::measure::status::Status;
 use crate::measure::warm::{Hint, WarmStart};
@@ -195,7 +195,7 @@ impl<'a> Query<'a> {
     fn relation(&self) -> Apart<'a> {
         let ((a, pose_a), (b, pose_b)) = (self.of_a, self.of_b);
         let tolerance = self.options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
-        Apart { pose_a, pose_b, goal: self.goal, tolerance, facing: self.facing }
+        Apart { pose_a, pose_b, goal: self.goal, tolerance, angle: ALIGNED, facing: self.facing }
     }
 
     fn pair(&self) -> Pair<'a> {

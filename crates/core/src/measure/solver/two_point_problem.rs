@@ -94,6 +94,8 @@ pub(in crate::measure) struct Apart<'a> {
     pub(in crate::measure) goal: &'a StopCriterion,
     /// Width of the bracket that is narrow enough, metres.
     pub(in crate::measure) tolerance: f64,
+    /// Largest angle between the bodies' normals, radians, that an answer is taken at.
+    pub(in crate::measure) angle: f64,
     /// From B to A, in A's frame, to start from; without one, across the gap of the ellipsoids that
     /// stand for the bodies.
     pub(in crate::measure) facing: Option<V3<f64>>,
@@ -131,7 +133,7 @@ impl Relation for Apart<'_> {
     fn judge<S: Simd>(&self, _: S, found: &Bracket<f64>, _: &M3<f64>, difference: V3<f64>) -> Verdict {
         // Below the rounding floor no bracket gets, however long Newton's method goes on.
         let narrow = found.upper - found.lower <= self.tolerance.max(4.0 * found.rounding);
-        let enough = narrow && found.off <= ALIGNED || self.goal.met(found.lower, found.upper);
+        let enough = narrow && found.off <= self.angle || self.goal.met(found.lower, found.upper);
         // A bound that is not a number proves nothing.
         if enough && found.lower > 0.0 && found.upper.is_finite() {
             Verdict::Proven { lower: found.lower, upper: found.upper }

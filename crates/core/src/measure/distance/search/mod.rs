@@ -20,7 +20,7 @@ use crate::measure::solver::refinement::RefinedPair;
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::support_table_gjk::approach;
-use crate::measure::solver::tangent_newton::{PATIENCE, SEEK_ROUNDS};
+use crate::measure::solver::tangent_newton::{ALIGNED, PATIENCE, SEEK_ROUNDS};
 use crate::measure::solver::two_point_problem::Apart;
 use crate::measure::warm::Hint;
 use crate::optimize::Approach;
@@ -321,7 +321,7 @@ impl<'a> Search<'a> {
         }
         let (pose_a, pose_b) = pair.poses();
         let tolerance = self.tolerance * pair.unit();
-        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance, facing: None };
+        let relation = Apart { pose_a, pose_b, goal: self.goals.0, tolerance, angle: ALIGNED, facing: None };
         let from = Some(Start { x: self.centered(x), y: self.centered(y), n: (*n).into() });
         let most = SEEK_ROUNDS.min(options.max_iterations() - self.iterations);
         let mut trace = Trace::default();

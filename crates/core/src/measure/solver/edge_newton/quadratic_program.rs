@@ -20,6 +20,12 @@ use crate::polynomial::Simd;
 /// little are refused, and left to the general search; smaller, rounding moves points along them.
 const DEPENDENT: f64 = 1e-9;
 
+/// How far below 0 the multiplier of an active constraint may be, relative to what the slope is
+/// computed from: its rounding, and more. Larger, a side that pulls away stays active; smaller,
+/// rounding changes the active set. `cut_bodies_agree_with_the_general_search` counts what is
+/// solved.
+const NEGATIVE: f64 = 1e-12;
+
 /// A constraint `n·d + e <= 0`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Row {
@@ -68,9 +74,9 @@ pub(super) struct Minimum {
     pub(super) multipliers: [f64; MAX_ACTIVE],
 }
 
-/// The minimiser, from a set of active constraints that is not empty; none if it is not found.
-/// Constraints may be violated by as much as `slack`; `smallest` is added to the curvature that is
-/// divided by.
+/// The minimiser for a gradient of length about 1, from a set of active constraints that is not
+/// empty; none if it is not found. Constraints may be violated by as much as `slack`; `smallest` is
+/// added to the curvature that is divided by.
 #[inline(always)]
 pub(super) fn minimize<S: Simd>(
     simd: S,
@@ -81,7 +87,8 @@ pub(super) fn minimize<S: Simd>(
 ) -> Option<Minimum> {
     for _ in 0..MAX_CHANGES {
         let step = OnActive::new(simd, hessian, rows, &active, smallest)?.minimizer(simd, hessian, gradient);
-        if let Checked::Minimum(multipliers) = check(simd, (hessian, gradient), rows, &mut active, step, slack)? {
+        let allowed = (slack, 1.0);
+        if let Checked::Minimum(multipliers) = check(simd, (hessian, gradient), rows, &mut active, step, allowed)? {
             return Some(Minimum { step, active, multipliers });
         }
     }
@@ -104,7 +111,7 @@ fn enumerate<S: Simd>(
         sets.len = 0;
         indices.iter().for_each(|&i| sets.push(i));
         let step = OnActive::new(simd, hessian, rows, &sets, smallest)?.minimizer(simd, hessian, gradient);
-        match check(simd, (hessian, gradient), rows, &mut sets.clone(), step, slack)? {
+        match check(simd, (hessian, gradient), rows, &mut sets.clone(), step, (slack, 1.0))? {
             Checked::Minimum(multipliers) => Some(Minimum { step, active: sets, multipliers }),
             Checked::Exchanged => None,
         }
@@ -136,8 +143,9 @@ pub(super) enum Checked {
 }
 
 /// Whether a step that is stationary on its active constraints is the minimiser over all: their
-/// multipliers are at least 0, and no other constraint is violated by more than `slack`. If not,
-/// changes the active set; none if that is not possible.
+/// multipliers are at least 0, but for the rounding of slopes that are computed from numbers of
+/// this `scale`, and no other constraint is violated by more than `slack`. If not, changes the
+/// active set; none if that is not possible.
 #[inline(always)]
 pub(super) fn check<S: Simd>(
     simd: S,
@@ -145,7 +153,7 @@ pub(super) fn check<S: Simd>(
     rows: &[Row],
     active: &mut ActiveRows,
     step: V3<f64>,
-    slack: f64,
+    (slack, scale): (f64, f64),
 ) -> Option<Checked> {
     let slope = add_scaled::<S, f64>(apply_symmetric::<S, f64>(hessian, step), 1.0, gradient);
     let mut multipliers = multipliers_of(simd, rows, active, scaled::<S, f64>(slope, -1.0))?;
@@ -155,8 +163,7 @@ pub(super) fn check<S: Simd>(
             least = k;
         }
     }
-    // Less than 0 by the rounding of a multiplier of about 1.
-    if multipliers[least] < -1e-12 {
+    if multipliers[least] < -NEGATIVE * scale {
         if active.len > 1 {
             active.remove(least);
             return Some(Checked::Exchanged);

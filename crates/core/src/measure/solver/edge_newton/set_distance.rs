@@ -15,7 +15,7 @@
 //! Proofs are those of [`super`], with the set's support function in place of a second body.
 
 use super::aggregate::{Evaluated, Weighted};
-use super::distance::{FLATTEST, VIOLATED, tangent_of_angle};
+use super::distance::{ALIGNED, FLATTEST, VIOLATED, tangent_of_angle};
 use super::linearized::Linearized;
 use super::quadratic_program::minimize;
 use super::share_inside::share_inside;
@@ -33,7 +33,7 @@ use crate::measure::solver::exact_shape::{
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{
-    ALIGNED, AT_REST_SQUARED, FEATURES, LONGEST_MOVE, LONGEST_STEP, PATIENCE, RETREATS, Relative, SEEK_ROUNDS, Side,
+    AT_REST_SQUARED, FEATURES, LONGEST_MOVE, LONGEST_STEP, PATIENCE, RETREATS, Relative, SEEK_ROUNDS, Side,
     TAYLOR_ROUNDING, WORTH_A_BRACKET, moved,
 };
 use crate::polynomial::{Simd, WithSimd};
