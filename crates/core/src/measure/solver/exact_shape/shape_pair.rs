@@ -57,6 +57,18 @@ pub(super) const FINELY_ALIGNED: f64 = ALIGNED / 8.0;
 /// they are. Exercised by `shapes_against_shapes`.
 pub(super) const CROSSED: f64 = 1e-12;
 
+/// Largest slope of the distance along A at its witness, dimensionless, with which Newton's method
+/// ends at once: along a line that is nearly parallel to one of B a slope of s moves the nearest
+/// point by the square of the inverse of that angle times s, and turns the normal by its inverse.
+///
+/// Larger, gradients of lines that are nearly parallel are off by more than 1e-6; smaller, steps
+/// are made that move nothing. Pinned by `family_20_gradients_of_primitives`, seed 3123.
+const LEVEL_SLOPE: f64 = 1e-12;
+
+/// Most steps of Newton's method from an answer that is aligned on to a slope below
+/// [`LEVEL_SLOPE`]. It doubles the digits; what rounding then leaves no step changes.
+const MOST_POLISHING: u32 = 2;
+
 /// Margin, relative to the sizes, dimensionless, by which sets have to overlap to be reported as
 /// overlapping: some times what rounding adds to an upper bound.
 ///
@@ -140,6 +152,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
             is_aligned: false,
         };
         let mut seen = self.b.offset(Scalar, self.placed(own));
+        let mut polished = 0;
         for steps in 1..=MAX_STEPS {
             if options.exhausted(steps - 1) {
                 break;
@@ -155,13 +168,18 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
             let (v, y) = (scaled::<Scalar, f64>(seen.frame[2], seen.distance), self.b.project(Scalar, x));
             let rounding = self.rounding(x);
             let upper = seen.distance + rounding;
-            if upper < best.upper {
+            // Of an answer that is polished the last points and normal count, not what rounding makes
+            // of the bracket.
+            let is_polished = polished > 0;
+            if upper < best.upper || is_polished && upper - best.lower <= tolerance {
                 (best.upper, best.x, best.y) = (upper, x, y);
             }
+            let mut highest = if is_polished { best.upper - tolerance } else { best.lower };
             for n in self.normals(own, seen.frame[2], seen.feature) {
                 let lower = self.along(n) - rounding;
-                if lower > best.lower || best.n == [0.0; 3] && !lower.is_nan() {
-                    (best.lower, best.n) = (lower.max(0.0), n);
+                if lower > highest || best.n == [0.0; 3] && !lower.is_nan() {
+                    (best.lower, best.n) = (lower.max(best.lower), n);
+                    highest = highest.max(lower);
                 }
             }
             if goal.met(best.lower, best.upper) {
@@ -173,15 +191,17 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
                 // Far away the places count, not the angle; at short distances rounding allows no
                 // better direction.
                 let reach = self.a.reach() + self.b.reach();
-                let enough =
-                    (FINELY_ALIGNED * seen.distance.min(reach)).max(2.0 * f64::EPSILON * (reach + seen.distance));
+                let floor = 2.0 * f64::EPSILON * (reach + seen.distance);
+                let enough = (FINELY_ALIGNED * seen.distance.min(reach)).max(floor);
                 let inward =
                     apply_transposed::<Scalar, f64>(&self.rotation, scaled::<Scalar, f64>(seen.frame[2], -1.0));
                 let slides = self.a.slide(Scalar, own, inward) * seen.distance;
-                best.is_aligned = dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
-                if best.is_aligned || best.upper <= tolerance {
+                best.is_aligned |= dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
+                let is_level = slides <= floor.max(LEVEL_SLOPE * seen.distance) || polished == MOST_POLISHING;
+                if best.is_aligned && is_level || best.upper <= tolerance {
                     break;
                 }
+                polished += u32::from(best.is_aligned);
             }
             // Newton's step in A's frame.
             let gradient = apply_transposed::<Scalar, f64>(&self.rotation, v);
