@@ -11,7 +11,7 @@ help:
 	@echo 'make acceptance    what is too long for every change, all eight of these: SUBLEVEL_DATA=DIR'
 	@echo '  make endurance     1e8 checked queries; interrupted, it continues where it was (QUERIES=1e9 for more)'
 	@echo '  make fuzz          1e6 damaged inputs for each reader of files and calls (RUNS=10000000 for more)'
-	@echo '  make draws         1e5 draws of each family of the stability tests (DRAWS=1000 for fewer)'
+	@echo '  make draws         5e3 draws of each family of the stability tests, an hour (DRAWS=100000 for a day of them)'
 	@echo '  make measures      time every measure beside coal and parry, and fail where a target is missed'
 	@echo '  make kills         kill a server under load 1e3 times, with a ledger of its answers (KILLS=100 for fewer)'
 	@echo '  make soak          load a server for half an hour, and see its memory and descriptors (SOAK=60 for a minute)'
@@ -48,7 +48,7 @@ acceptance: endurance fuzz draws measures kills soak solvers robots
 
 QUERIES ?= 1e8
 RUNS ?= 1000000
-DRAWS ?= 100000
+DRAWS ?= 5000
 KILLS ?= 1000
 SOAK ?= 1800
 

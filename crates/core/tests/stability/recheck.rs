@@ -13,7 +13,7 @@ use sublevel_core::measure::{
     signed_distance,
 };
 use sublevel_testkit::bodies::{Placed, b, c, cylinder, e, fitted, p, q};
-use sublevel_testkit::random::{Seeded, draws, shifted};
+use sublevel_testkit::random::{Seeded, draws, seeds, shifted};
 use sublevel_testkit::reference;
 
 /// Signed gaps relative to the smaller body.
@@ -160,20 +160,19 @@ fn growth_distances_are_proven_exactly() {
 fn depths_are_proven_exactly() {
     let pool = pool();
     let (mut proven, mut open) = (0, 0);
-    for seed in 303_000..303_000 + draws(200) {
+    for seed in seeds(303_000, 200, &[304_966]) {
         let draw = Draw::new(&pool, seed, &GAPS[9..]);
         let (a, b) = draw.placed();
         let signed = |options: &Options<'_>| signed_distance(a.0, a.1, b.0, b.1, options, &mut WarmStart::default());
         let deep = |options: &Options<'_>| penetration(a.0, a.1, b.0, b.1, options, &mut WarmStart::default());
-        let (first, second) = (signed(&tight()), deep(&tight()));
-        let other = SignedDistance {
-            witness_a: second.witness_a,
-            witness_b: second.witness_b,
-            normal: second.direction,
-            ..first
-        };
+        // Of directions that are as short within the accuracy, each solve may find another.
+        let answer = (signed(&draw.options), deep(&draw.options));
+        let ways = [answer, (signed(&tight()), deep(&tight()))].into_iter().flat_map(|(first, second)| {
+            let (witness_a, witness_b, normal) = (second.witness_a, second.witness_b, second.direction);
+            [first, SignedDistance { witness_a, witness_b, normal, ..first }]
+        });
         let proof = proof(a, b);
-        let ways = [first, other].into_iter().filter_map(|way| {
+        let ways = ways.filter_map(|way| {
             let truth = reference::signed::signed_distance(a.0, a.1, b.0, b.1, &way)?;
             Some(proof.parted(&truth.normal, &truth.dual))
         });
@@ -184,10 +183,10 @@ fn depths_are_proven_exactly() {
             continue;
         };
         proven += 1;
-        let (signed, deep) = (signed(&draw.options), deep(&draw.options));
+        let (signed, deep) = answer;
         let label = format!("{}: {signed:?} {deep:?}", draw.label);
         assert!(exact(signed.lower) <= shortest, "{label}: deeper than that");
         assert!(exact(deep.upper) >= -shortest, "{label}: deeper than that");
     }
-    assert!(open < proven / 5, "{proven} proven, {open} open");
+    assert!(5 * open < proven, "{proven} proven, {open} open");
 }
