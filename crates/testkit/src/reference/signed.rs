@@ -34,8 +34,12 @@ const TARGET: f64 = 1e-40;
 /// the step.
 const SOLVED: f64 = 1e-28;
 
+/// Cosine of the angle between the normals of an answer and of a stationary point next to it, at
+/// least.
+const NEXT: f64 = 0.9;
+
 /// Solves for the stationary point next to an answer. None if Newton's method finds none with
-/// multipliers of the right sign.
+/// multipliers of the right sign, or only some that are far away.
 pub fn signed_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &SignedDistance) -> Option<Truth> {
     let (large, small) = (a.circumscribed().radius, b.circumscribed().radius);
     let (large, small) = (large.max(small), large.min(small));
@@ -56,6 +60,8 @@ pub fn signed_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer:
                 let inside = |body: &Solid<'_>, v| body.largest(v) <= big(1.0) + big(TARGET);
                 let settled = settled.is_some_and(|length| length <= TARGET);
                 let solved = settled && signs && iterate.residual(&one, &two) <= SOLVED;
+                let found = Vector3::from_fn(|k, _| double(&iterate.n[k]));
+                let solved = solved && found.dot(&normal) >= NEXT;
                 if solved && inside(&one, &iterate.x) && inside(&two, &iterate.y) {
                     let metres = big(unit);
                     let (x, y) = (scaled(&iterate.x, &metres), scaled(&iterate.y, &metres));
