@@ -433,7 +433,14 @@ fn family_20_gradients_of_primitives() {
         for gap in GAPS {
             let pair = at_gap(seed, gap, &mut Seeded(1_200_000 + seed));
             let label = format!("seed {seed}");
-            count.set(count.get() + u32::from(sloped(&pair, &cold(&pair, &label), &label)));
+            let alone = cold(&pair, &label);
+            count.set(count.get() + u32::from(sloped(&pair, &alone, &label)));
+            if let Some(found) = pair.solve_in_lanes(&pair.options()) {
+                let label = format!("{label} in lanes");
+                let flaw = pair.flaw(&found, &alone.1);
+                assert!(flaw.is_none(), "{flaw:?}, {label} {}: {found:?}", pair.what);
+                sloped(&pair, &(found, alone.1), &label);
+            }
             let mut random = Seeded(seed);
             let before = shifted(&pair.pose_b, random.unit() * (0.01 * pair.size()));
             let mut warm = WarmStart::default();

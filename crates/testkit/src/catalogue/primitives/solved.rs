@@ -8,8 +8,9 @@ use nalgebra::Vector3;
 use sublevel_core::body::Body;
 use sublevel_core::measure::{
     Capsule, CapsuleDistance, Distance, HalfSpace, HalfSpaceDistance, Options, Pose, Status, Twist, WarmStart,
-    distance, distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule, distance_to_half_space,
-    distance_to_point,
+    distance, distance_batch, distance_of_capsule_to_half_space, distance_of_capsules, distance_to_capsule,
+    distance_to_capsule_batch, distance_to_half_space, distance_to_point, is_capsule_solved_in_lanes,
+    is_solved_in_lanes,
 };
 
 /// An answer, of whatever measure: metres, world frame.
@@ -203,6 +204,32 @@ impl Pair {
                 self.clone().swapped().solve(options, warm).swapped()
             }
             _ => panic!("{} has no measure", self.what),
+        }
+    }
+
+    /// Our answer in a batch of the same pose several times over; none of pairs that batches solve
+    /// one by one.
+    ///
+    /// # Panics
+    /// Never: there are as many answers as poses.
+    pub fn solve_in_lanes(&self, options: &Options<'_>) -> Option<Solved> {
+        const COUNT: usize = 8;
+        let Self { a, pose_a, b, pose_b, .. } = self;
+        let poses = [*pose_b; COUNT];
+        match (a, b) {
+            (Shape::Body(a), Shape::Body(b)) if is_solved_in_lanes(&**a, &**b) => {
+                let mut found = [Distance::default(); COUNT];
+                distance_batch(&**a, pose_a, &**b, &poses, options, &mut found).expect("an answer for each pose");
+                Some(Solved::of_bodies(&found[0], pose_a, pose_b))
+            }
+            (Shape::Body(a), Shape::Capsule(b)) if is_capsule_solved_in_lanes(&**a, b) => {
+                let mut found = [CapsuleDistance::default(); COUNT];
+                distance_to_capsule_batch(&**a, &[*pose_a], b, &poses, options, &mut found)
+                    .expect("an answer for each pose");
+                Some(Solved::of_capsules(&found[0], pose_a, pose_b))
+            }
+            (Shape::Capsule(_), Shape::Body(_)) => self.clone().swapped().solve_in_lanes(options).map(Solved::swapped),
+            _ => None,
         }
     }
 

@@ -63,7 +63,7 @@ pub(super) const CROSSED: f64 = 1e-12;
 ///
 /// Larger, gradients of lines that are nearly parallel are off by more than 1e-6; smaller, steps
 /// are made that move nothing. Pinned by `family_20_gradients_of_primitives`, seed 3123.
-const LEVEL_SLOPE: f64 = 1e-10;
+pub(super) const LEVEL_SLOPE: f64 = 1e-10;
 
 /// Most steps of Newton's method from an answer that is aligned on to a slope below
 /// [`LEVEL_SLOPE`]. It doubles the digits; what rounding then leaves no step changes.

@@ -7,7 +7,9 @@ use super::least::LaneLeast;
 use super::set::{LaneOffset, LaneSet};
 use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{M3, V3, add, add_scaled, apply, apply_transposed, dot, scaled, subtract};
-use crate::measure::solver::exact_shape::shape_pair::{CROSSED, FINELY_ALIGNED, FLAT, LEVEL, MOST_CUTS, share_of_step};
+use crate::measure::solver::exact_shape::shape_pair::{
+    CROSSED, FINELY_ALIGNED, FLAT, LEVEL, LEVEL_SLOPE, MOST_CUTS, share_of_step,
+};
 use crate::measure::solver::tangent_newton::TAYLOR_ROUNDING;
 use crate::polynomial::{Number, Simd, Vector, gamma};
 use nalgebra::Vector3;
@@ -103,9 +105,10 @@ impl<A: LaneLeast, B: LaneSet, N: Copy> LanePair<A, B, N> {
         let slide = self.a.slide(simd, own, scaled(gradient, splat(-1.0)));
         // Far away the places count, not the angle; at short distances rounding allows no better
         // direction.
-        let enough = (splat(FINELY_ALIGNED) * distance.min(reach)).max(splat(2.0 * f64::EPSILON) * (reach + distance));
-        let enough = enough * enough;
-        let is_aligned = N::and(simd, dot(off, off).le(enough), dot(slide, slide).le(enough));
+        let floor = splat(2.0 * f64::EPSILON) * (reach + distance);
+        let enough = (splat(FINELY_ALIGNED) * distance.min(reach)).max(floor);
+        let level = (splat(LEVEL_SLOPE) * distance).max(floor).min(enough);
+        let is_aligned = N::and(simd, dot(off, off).le(enough * enough), dot(slide, slide).le(level * level));
         let is_narrow = N::and(simd, lower.le(upper), (upper - lower).le(splat(tolerance)));
         let is_apart = splat(f64::MIN_POSITIVE).le(lower);
         let is_proven = N::and(simd, is_aligned, N::and(simd, is_narrow, is_apart));
