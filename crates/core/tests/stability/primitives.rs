@@ -26,7 +26,7 @@ use sublevel_testkit::catalogue::primitives::placement::{
 use sublevel_testkit::catalogue::primitives::scale::{ALL_NEEDLES, far_from_the_origin, in_unit, needles, ratio};
 use sublevel_testkit::catalogue::primitives::{COUNT, Kind, PAIRS, Pair, Reference, Shape, Solved};
 use sublevel_testkit::catalogue::scale::{DOUBLINGS, scales};
-use sublevel_testkit::random::{Seeded, draws, seeds, shifted};
+use sublevel_testkit::random::{Seeded, draws, replayed, seeds, shifted};
 
 /// An answer is a bracket around the truth with a true status, finite numbers and kept limits.
 fn judged(pair: &Pair, warm: &mut WarmStart, label: &str) -> (Solved, Reference) {
@@ -325,8 +325,8 @@ fn family_11_units_of_primitives() {
 fn family_12_needles_and_plates_of_primitives() {
     each(seeds(0, 5 * ALL_NEEDLES, &[2056]), |seed| {
         let Some(pair) = needles(seed, &mut Seeded(1_120_000 + seed)) else { return };
-        // A million times longer than thick: an ellipsoid and a plate of degree 8, 1e-7 m apart, and
-        // two ellipsoids 3e-8 m apart.
+        // A million times longer than thick: an ellipsoid and a plate of degree 8, 1e-7 m apart,
+        // and two ellipsoids 3e-8 m apart.
         if [1168, 2056].contains(&seed) {
             return wide(&pair);
         }
@@ -427,9 +427,8 @@ fn family_19_primitives_swapped_and_carried() {
 #[test]
 fn family_20_gradients_of_primitives() {
     let count = Cell::new(0);
-    let seeds = seeds(0, 2 * COUNT, &[440, 927, 1632, 3123, 3935]);
-    let least = if seeds.len() as u64 >= 2 * COUNT { 500 } else { 0 };
-    each(seeds, |seed| {
+    let in_lanes = Cell::new(0);
+    each(seeds(0, 2 * COUNT, &[440, 927, 1632, 3123, 3935]), |seed| {
         for gap in GAPS {
             let pair = at_gap(seed, gap, &mut Seeded(1_200_000 + seed));
             let label = format!("seed {seed}");
@@ -439,7 +438,7 @@ fn family_20_gradients_of_primitives() {
                 let label = format!("{label} in lanes");
                 let flaw = pair.flaw(&found, &alone.1);
                 assert!(flaw.is_none(), "{flaw:?}, {label} {}: {found:?}", pair.what);
-                sloped(&pair, &(found, alone.1), &label);
+                in_lanes.set(in_lanes.get() + u32::from(sloped(&pair, &(found, alone.1), &label)));
             }
             let mut random = Seeded(seed);
             let before = shifted(&pair.pose_b, random.unit() * (0.01 * pair.size()));
@@ -449,7 +448,9 @@ fn family_20_gradients_of_primitives() {
             sloped(&pair, &judged(&pair, &mut warm, &label), &label);
         }
     });
-    assert!(count.get() > least, "{} gradients", count.get());
+    let [count, in_lanes] = [count.get(), in_lanes.get()];
+    println!("{count} gradients, {in_lanes} in lanes");
+    assert!(replayed() || count > 500 && in_lanes > 50, "{count} gradients, {in_lanes} in lanes");
 }
 
 #[test]

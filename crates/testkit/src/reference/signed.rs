@@ -35,11 +35,12 @@ const TARGET: f64 = 1e-40;
 const SOLVED: f64 = 1e-28;
 
 /// Cosine of the angle between the normals of an answer and of a stationary point next to it, at
-/// least.
+/// least. Smaller, the point may belong to another direction; larger, answers at flat sides, whose
+/// normals turn a lot within the accuracy, have no reference.
 const NEXT: f64 = 0.9;
 
 /// Solves for the stationary point next to an answer. None if Newton's method finds none with
-/// multipliers of the right sign, or only some that are far away.
+/// multipliers of the right sign, or only some whose normals are turned by more.
 pub fn signed_distance(a: &Body, pose_a: &Pose, b: &Body, pose_b: &Pose, answer: &SignedDistance) -> Option<Truth> {
     let (large, small) = (a.circumscribed().radius, b.circumscribed().radius);
     let (large, small) = (large.max(small), large.min(small));

@@ -74,8 +74,8 @@ pub(super) struct Minimum {
     pub(super) multipliers: [f64; MAX_ACTIVE],
 }
 
-/// The minimiser for a gradient of length about 1, from a set of active constraints that is not
-/// empty; none if it is not found. Constraints may be violated by as much as `slack`; `smallest` is
+/// The minimiser, from a set of active constraints that is not empty; none if it is not found.
+/// Multipliers down to -[`NEGATIVE`] count as 0, however long the gradient is. Constraints may be violated by as much as `slack`; `smallest` is
 /// added to the curvature that is divided by.
 #[inline(always)]
 pub(super) fn minimize<S: Simd>(

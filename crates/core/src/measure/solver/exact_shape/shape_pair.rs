@@ -58,15 +58,18 @@ pub(super) const FINELY_ALIGNED: f64 = ALIGNED / 8.0;
 pub(super) const CROSSED: f64 = 1e-12;
 
 /// Largest slope of the distance along A at its witness, dimensionless, with which Newton's method
-/// ends at once: along a line that is nearly parallel to one of B a slope of s moves the nearest
-/// point by the square of the inverse of that angle times s, and turns the normal by its inverse.
+/// ends at once. Where A's edge or axis is at an angle θ to an edge of B, a distance D away, a
+/// slope of s leaves the witness s D / θ² from the nearest point, and the normal turned by s / θ.
 ///
-/// Larger, gradients of lines that are nearly parallel are off by more than 1e-6; smaller, steps
-/// are made that move nothing. Pinned by `family_20_gradients_of_primitives`, seed 3123.
+/// Larger, gradients of edges at small angles are off by more than 1e-6; smaller, steps are made
+/// that move nothing. Pinned by `family_20_gradients_of_primitives`, seed 3123.
 pub(super) const LEVEL_SLOPE: f64 = 1e-10;
 
 /// Most steps of Newton's method from an answer that is aligned on to a slope below
-/// [`LEVEL_SLOPE`]. It doubles the digits; what rounding then leaves no step changes.
+/// [`LEVEL_SLOPE`]: each doubles the digits of the slope.
+///
+/// Smaller, gradients of edges at small angles are off by more than 1e-6; larger, steps are made
+/// where rounding alone is left.
 const MOST_POLISHING: u32 = 2;
 
 /// Margin, relative to the sizes, dimensionless, by which sets have to overlap to be reported as
@@ -168,8 +171,8 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
             let (v, y) = (scaled::<Scalar, f64>(seen.frame[2], seen.distance), self.b.project(Scalar, x));
             let rounding = self.rounding(x);
             let upper = seen.distance + rounding;
-            // Of an answer that is polished the last points and normal count, not what rounding makes
-            // of the bracket.
+            // Of an answer that is polished the last points and normal count, not what rounding
+            // makes of the bracket.
             let is_polished = polished > 0;
             if upper < best.upper || is_polished && upper - best.lower <= tolerance {
                 (best.upper, best.x, best.y) = (upper, x, y);
@@ -196,7 +199,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
                 let inward =
                     apply_transposed::<Scalar, f64>(&self.rotation, scaled::<Scalar, f64>(seen.frame[2], -1.0));
                 let slides = self.a.slide(Scalar, own, inward) * seen.distance;
-                best.is_aligned |= dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
+                best.is_aligned = dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
                 let is_level = slides <= floor.max(LEVEL_SLOPE * seen.distance) || polished == MOST_POLISHING;
                 if best.is_aligned && is_level || best.upper <= tolerance {
                     break;
