@@ -199,7 +199,7 @@ impl<A: Projectable, B: Projectable> ShapePair<A, B> {
                 let inward =
                     apply_transposed::<Scalar, f64>(&self.rotation, scaled::<Scalar, f64>(seen.frame[2], -1.0));
                 let slides = self.a.slide(Scalar, own, inward) * seen.distance;
-                best.is_aligned = dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
+                best.is_aligned |= dot::<Scalar, f64>(off, off) <= enough * enough && slides <= enough;
                 let is_level = slides <= floor.max(LEVEL_SLOPE * seen.distance) || polished == MOST_POLISHING;
                 if best.is_aligned && is_level || best.upper <= tolerance {
                     break;
