@@ -39,7 +39,7 @@ pub(in crate::measure) fn prove(best: &mut Best<'_>) -> Proof {
     }
     // With a table of directions that costs little to lay out and serves nearly all pairs, then
     // with one for ties.
-    match sweep::<FEW>(best) {
+    match sweep::<128>(best) {
         (proof, true) if !best.options.exhausted(best.iterations) => {
             let (more, _) = sweep::<2048>(best);
             Proof { lower: more.lower.max(proof.lower), directions: more.directions + proof.directions, ..more }
@@ -47,12 +47,6 @@ pub(in crate::measure) fn prove(best: &mut Best<'_>) -> Proof {
         (proof, _) => proof,
     }
 }
-
-/// Directions in the smaller table. It changes time only.
-const FEW: usize = 128;
-
-/// How many times triangles are split, as many as there are lanes, in one iteration.
-const GROUPS: usize = 8;
 
 /// Sweeps the sphere of directions until the bracket is narrow; also says whether the table was
 /// full first.
@@ -71,11 +65,11 @@ fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
     if best.depth > 0.0 && !best.settled {
         best.settle();
     }
-    let lower = if sweep.covering.added() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
+    let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
     let proof = Proof {
         lower: lower.min(best.depth.max(0.0)),
         tied: sweep.tied(best),
-        directions: sweep.covering.added() as u32,
+        directions: sweep.covering.directions().len() as u32,
     };
     (proof, full)
 }
@@ -128,11 +122,9 @@ impl<const N: usize> Sweep<'_, N> {
             self.open([sign(0), sign(1), sign(2)], best);
         }
         loop {
-            if N > FEW && !self.covering.has_room(GROUPS * MAX_LANES) {
-                self.covering.compact(self.elsewhere(best));
-            }
             let before = self.covering.directions().len();
-            for _ in 0..GROUPS {
+            // Eight groups are one iteration.
+            for _ in 0..8 {
                 if best.depth <= 0.0 || self.covering.is_closed() {
                     return Some(());
                 }
@@ -311,13 +303,6 @@ impl<const N: usize> Sweep<'_, N> {
             self.open([middle, j, k], best);
         }
         true
-    }
-
-    /// The direction far from the best along which the bodies are least deep.
-    fn elsewhere(&self, best: &Best<'_>) -> Option<usize> {
-        let (n, directions) = (best.n?, self.covering.directions());
-        let others = (0..directions.len()).filter(|&i| directions[i].n.dot(&n) < ELSEWHERE);
-        others.min_by(|&i, &j| directions[i].depth().total_cmp(&directions[j].depth()))
     }
 
     /// Whether a direction far from the best is about as good, or one near it may be better.

@@ -117,6 +117,8 @@ impl<'a> RefinedAxis<'a> {
             // The upper bound stays the one that the points of the answer attain.
             if own.is_finite() && own <= width {
                 (width, upper, at) = (own, found.upper, Some(*found));
+            } else if width == f64::INFINITY {
+                upper = upper.min(found.upper);
             }
             upper - lower <= tolerance && found.aligned || options.stopped()
         });
