@@ -75,8 +75,8 @@ pub(super) struct Minimum {
 }
 
 /// The minimiser, from a set of active constraints that is not empty; none if it is not found.
-/// Multipliers down to -[`NEGATIVE`] count as 0, however long the gradient is. Constraints may be violated by as much as `slack`; `smallest` is
-/// added to the curvature that is divided by.
+/// Multipliers down to -[`NEGATIVE`] count as 0, however long the gradient is. Constraints may be
+/// violated by as much as `slack`; `smallest` is added to the curvature that is divided by.
 #[inline(always)]
 pub(super) fn minimize<S: Simd>(
     simd: S,
