@@ -8,7 +8,7 @@ use sublevel_core::measure::WarmStart;
 
 use super::object::Slot;
 
-/// Entries of a table, so that memory is bounded by about 42 MB, and by what is used, block by
+/// Entries of a table, so that memory is bounded by about 55 MB, and by what is used, block by
 /// block.
 const ENTRIES: usize = 1 << 16;
 

@@ -192,8 +192,9 @@ impl ClosedForm {
             ExactShape::Cuboid { half_extents_m, .. } => Vector3::from_fn(|i, _| half_extents_m[i] * sign(own[i])),
             ExactShape::Cylinder { radius_m, half_height_m, .. } => {
                 let length = own.x.hypot(own.y);
-                let share = if length > 0.0 { radius_m / length } else { 0.0 };
-                Vector3::new(own.x * share, own.y * share, half_height_m * sign(own.z))
+                // The quotient first: the radius over a tiny length is infinite.
+                let along = |v: f64| if length > 0.0 { v / length * radius_m } else { 0.0 };
+                Vector3::new(along(own.x), along(own.y), half_height_m * sign(own.z))
             }
             ExactShape::Capsule { radius_m, half_length_m } => {
                 own.try_normalize(0.0).unwrap_or_default() * radius_m + Vector3::z() * (half_length_m * sign(own.z))
@@ -293,6 +294,12 @@ mod tests {
                 shapes[(index % 3) as usize].moved(&rotation, &random.unit()).unwrap()
             })
             .collect();
+        // Next to an axis by less than what has an inverse.
+        for (body, z) in [(&shapes[0], 2.3), (&shapes[1], 0.9), (&shapes[2], 0.25)] {
+            let form = body.closed_form().expect("a shape");
+            let point = form.support_point(&Vector3::new(0.0, 2e-310, 1.0)) - form.center();
+            assert!(point.iter().all(|v| v.is_finite()) && (point.z - z).abs() < 1e-12, "{}: {point:?}", body.name());
+        }
         for seed in 0..3000 {
             let mut random = Seeded(seed);
             let body = if seed % 2 == 0 { &shapes[(seed % 3) as usize] } else { &moved[random.index(moved.len())] };

@@ -149,6 +149,10 @@ impl Solid for Compound {
         Compound::parts(self)
     }
 
+    fn id(&self) -> &BodyId {
+        Compound::id(self)
+    }
+
     fn circumscribed(&self) -> &Ball {
         Compound::circumscribed(self)
     }

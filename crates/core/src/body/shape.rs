@@ -68,6 +68,10 @@ impl Solid for Shape {
         }
     }
 
+    fn id(&self) -> &BodyId {
+        Shape::id(self)
+    }
+
     fn circumscribed(&self) -> &Ball {
         match self {
             Shape::Body(body) => body.circumscribed(),

@@ -2,6 +2,7 @@
 
 use super::bounds::{Aabb, Ball};
 use super::convex_body::Body;
+use super::id::BodyId;
 use super::part_tree::PartTree;
 
 /// What measures need of a solid: the convex bodies it is the union of, all in one frame, and a
@@ -11,6 +12,8 @@ use super::part_tree::PartTree;
 pub trait Solid: Sealed {
     /// The parts, at least one and at most [`MAX_PARTS`](super::MAX_PARTS).
     fn parts(&self) -> &[Body];
+    /// The hash of its content.
+    fn id(&self) -> &BodyId;
     /// A ball proven to contain all parts, metres.
     fn circumscribed(&self) -> &Ball;
     /// A box proven to contain all parts, metres.
@@ -28,6 +31,11 @@ impl Solid for Body {
     #[inline]
     fn parts(&self) -> &[Body] {
         std::slice::from_ref(self)
+    }
+
+    #[inline]
+    fn id(&self) -> &BodyId {
+        Body::id(self)
     }
 
     fn circumscribed(&self) -> &Ball {

@@ -24,6 +24,7 @@ mod growth;
 mod half_space;
 mod level;
 mod options;
+mod other_parts;
 mod overlap;
 mod pairwise_minimum;
 mod part_pairs;

@@ -5,6 +5,7 @@ use crate::body::{Ball, Body, NodeContent, PartCenters, PartNode, PartTree, Soli
 use crate::measure::bounds::culling::CULLING_SLACK;
 use crate::measure::frames::pose::{Pose, RELATIVE_ERROR};
 use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// What is known of a measure of all pairs of parts in two nodes.
 #[derive(Clone, Copy, Debug)]
@@ -46,6 +47,19 @@ impl SeenFrame {
         let size = apart + of_a.radius + of_b.radius + of_a.center.norm() + of_b.center.norm();
         apart - of_a.radius - of_b.radius - (RELATIVE_ERROR + CULLING_SLACK) * (size + self.offset)
     }
+
+    /// Upper bound of how far points in a ball of B have moved since B was seen `before`, by A,
+    /// metres.
+    ///
+    /// A point x has moved by `(R' - R) x + t' - t`. The difference of two rotations has singular
+    /// values s, s and 0, so that its norm is Frobenius' norm over √2.
+    pub(in crate::measure) fn moved_since(&self, before: &Self, Ball { center, radius }: &Ball) -> f64 {
+        let turned = self.rotation - before.rotation;
+        let size = center.norm() + radius + self.offset + before.offset;
+        let moved = (turned * center + self.translation - before.translation).norm();
+        // Either rotation may be off by the relative error, and is none by as much.
+        moved + turned.norm() * FRAC_1_SQRT_2 * radius + 4.0 * (RELATIVE_ERROR + CULLING_SLACK) * size
+    }
 }
 
 /// The tree of a single part.
@@ -76,13 +90,13 @@ pub(in crate::measure) struct TreePair<'a, F> {
     bound: F,
 }
 
-/// Two trees where they stand, with the gaps of their balls: lower bounds of distances, and of
-/// minus the depths, of all parts.
+/// Two trees, that of B where it is seen from A, with the gaps of their balls: lower bounds of
+/// distances, and of minus the depths, of all parts.
 pub(in crate::measure) fn ball_gaps<'a>(
-    (a, pose_a): (&'a [PartNode], &Pose),
-    (b, pose_b): (&'a [PartNode], &Pose),
+    a: &'a [PartNode],
+    b: &'a [PartNode],
+    seen: SeenFrame,
 ) -> TreePair<'a, impl Fn(usize, usize) -> NodeBound + use<'a>> {
-    let seen = SeenFrame::new(pose_a, pose_b);
     TreePair::new(a, b, move |i, j| NodeBound::of(seen.gap(&a[i].ball, &b[j].ball)))
 }
 

@@ -225,7 +225,7 @@ impl<'a> Projection<'a> {
         warm: &mut WarmStart,
     ) -> Projected {
         if let Some(form) = self.body.closed_form().filter(|_| runs(Stage::ClosedForm)) {
-            *warm = WarmStart::default();
+            warm.hint = Hint::Cold;
             match offset_of_point((form, &self.pose), point) {
                 PointSide::Inside => return Projected::inside(point, 0),
                 PointSide::Outside(PointOffset { lower, upper, normal, witness, .. }) => {
@@ -354,7 +354,7 @@ impl<'a> Projection<'a> {
             // Stopped before the first trial point: the interior point is a point of the body.
             upper = (q.nearest(&witness) - witness).norm() + body.displacement(&witness) + error;
         }
-        *warm = Hint::Single { y: single.to_body(&witness), active }.into();
+        warm.hint = Hint::Single { y: single.to_body(&witness), active };
         Projected {
             lower: in_metres(lower, -1.0),
             upper: in_metres(upper, 1.0),
@@ -404,7 +404,7 @@ impl<'a> Projection<'a> {
             let query = EdgeShapeQuery { body, pose, form, form_pose, goal, tolerance, options, start };
             let found = dispatch(query)?;
             let EdgeShapeProven { lower, upper, x, n, rounds, trace, .. } = found;
-            *warm = trace.map_or_else(WarmStart::default, |trace| Hint::EdgeShape(trace).into());
+            warm.hint = trace.map_or(Hint::Cold, Hint::EdgeShape);
             if upper == 0.0 {
                 return Ok(Projected::inside(point, rounds));
             }
@@ -425,10 +425,10 @@ impl<'a> Projection<'a> {
         };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
         if found.upper == 0.0 {
-            *warm = WarmStart::default();
+            warm.hint = Hint::Cold;
             return Ok(Projected::inside(point, found.rounds));
         }
-        *warm = found.trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
+        warm.hint = found.trace.map_or(Hint::Cold, Hint::Exact);
         let normal = -direction_to_world(&form, &form_pose, found.n);
         Ok(Projected {
             lower: found.lower,

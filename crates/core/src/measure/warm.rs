@@ -2,6 +2,7 @@
 
 use crate::body::Body;
 use crate::measure::frames::query_frame::Pair;
+use crate::measure::other_parts::OtherParts;
 use crate::measure::solver::active_constraints::ActiveSet;
 use crate::measure::solver::continuation::Trace;
 use crate::measure::solver::edge_newton::{EdgeShapeTrace, EdgeTrace};
@@ -37,6 +38,8 @@ pub struct WarmStart {
     pub(super) hint: Hint,
     /// Which parts of the two solids it is about.
     pub(super) parts: (u16, u16),
+    /// What is known of all other pairs of parts.
+    pub(super) others: Option<OtherParts>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,16 +77,16 @@ impl WarmStart {
     pub(super) fn is_cold(&self) -> bool {
         matches!(self.hint, Hint::Cold)
     }
+}
 
+impl Hint {
     /// A hint of witnesses x of A and y of B with the normal, in the query frame, and what is
     /// active there.
     pub(super) fn apart(pair: &Pair<'_>, [x, y, n]: [&Vector3<f64>; 3], (a, b): &(Active, Active)) -> Self {
         let (active_a, active_b) = (a.bits(), b.bits());
-        Hint::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }.into()
+        Self::Apart { x_a: pair.to_a(x), y_b: pair.to_b(y), normal_a: *n, active_a, active_b }
     }
-}
 
-impl Hint {
     /// Witnesses of the last answer, each in its body's frame, metres.
     pub(super) fn witnesses(&self, a: &Body, b: &Body) -> Option<[Vector3<f64>; 2]> {
         let [x, y] = match self {
@@ -108,6 +111,6 @@ impl Hint {
 
 impl From<Hint> for WarmStart {
     fn from(hint: Hint) -> Self {
-        Self { hint, parts: (0, 0) }
+        Self { hint, ..Self::default() }
     }
 }

@@ -162,7 +162,7 @@ impl Problem<'_> {
         } else if let Some(form) = of_body.0.closed_form() {
             match Axis::of_ball(form, of_body.1) {
                 Some(ball) => {
-                    *warm = WarmStart::default();
+                    warm.hint = Hint::Cold;
                     Ok(of_axes(&ball, &Axis::of_capsule(self.capsule, self.capsule_pose), self.tolerance))
                 }
                 None => self.of_shape((form, of_body.1), warm),
@@ -192,10 +192,10 @@ impl Problem<'_> {
         let query = ExactQuery { body, pose, form: &form, form_pose, goal: &goal, tolerance, options, trace, facing };
         let found = dispatch(query).map_err(|lost| lost.rounds)?;
         if found.upper == 0.0 {
-            *warm = WarmStart::default();
+            warm.hint = Hint::Cold;
             return Ok(self.met(&to_world(&form, form_pose, found.x), found.rounds));
         }
-        *warm = found.trace.map_or_else(WarmStart::default, |trace| Hint::Exact(trace).into());
+        warm.hint = found.trace.map_or(Hint::Cold, Hint::Exact);
         Ok(self.outside(&form, &found))
     }
 
@@ -225,7 +225,7 @@ impl Problem<'_> {
         let spent = match dispatch(query) {
             Ok(found) => {
                 let EdgeShapeProven { lower, upper, x, nearest, n, rounds, trace, .. } = found;
-                *warm = trace.map_or_else(WarmStart::default, |trace| Hint::EdgeShape(trace).into());
+                warm.hint = trace.map_or(Hint::Cold, Hint::EdgeShape);
                 if upper == 0.0 {
                     return Ok(self.met(&to_world(&form, form_pose, x), rounds));
                 }
@@ -288,7 +288,7 @@ impl Problem<'_> {
         let found = between_shapes(of_body, (&form, form_pose), start.as_ref(), goal, effort)?;
         let ShapeDistance { lower, upper, witness_a, witness_b, normal, steps, .. } = found;
         let x_a = pose.rotation().inverse_transform_vector(&(witness_a - pose.translation()));
-        *warm = Hint::Shapes { x_a }.into();
+        warm.hint = Hint::Shapes { x_a };
         if normal == Vector3::zeros() {
             let status = Status::of(upper - lower <= self.tolerance);
             return Ok(CapsuleDistance { status, lower, upper, ..self.met(&witness_a, steps) });

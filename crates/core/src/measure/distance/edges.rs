@@ -33,7 +33,7 @@ pub(super) fn of_edges(query: &Query<'_>, warm: &mut WarmStart) -> Result<Distan
     };
     let found = dispatch(EdgeQuery { a, pose_a, b, pose_b, goal, tolerance, options, start, trace })?;
     if !matches!(start, Some(EdgeStart::Last)) {
-        *warm = Hint::Edges(*trace).into();
+        warm.hint = Hint::Edges(*trace);
     }
     let narrow = found.upper - found.lower <= tolerance;
     if narrow || goal.met(found.lower, found.upper) {

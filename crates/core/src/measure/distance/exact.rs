@@ -75,7 +75,7 @@ impl<'a> Exact<'a> {
         goal: &StopCriterion,
         options: &Options<'_>,
         hint: &Hint,
-    ) -> Result<(Distance, WarmStart), (u32, WarmStart)> {
+    ) -> Result<(Distance, Hint), (u32, Hint)> {
         let Self { free: (body, pose), shape: (_, form_pose), form, swapped } = *self;
         let tolerance = self.tolerance(options);
         let witness;
@@ -91,7 +91,7 @@ impl<'a> Exact<'a> {
         match dispatch(ExactQuery { body, pose, form, form_pose, goal, tolerance, options, trace, facing: None }) {
             Ok(found) => Ok((self.answer(&found, tolerance), self.hint(&found))),
             Err(ExactLost { rounds, about }) => {
-                Err((rounds, about.map_or_else(WarmStart::default, |about| self.general_hint(&about))))
+                Err((rounds, about.map_or(Hint::Cold, |about| self.general_hint(&about))))
             }
         }
     }
@@ -119,10 +119,10 @@ impl<'a> Exact<'a> {
         let EdgeShapeProven { lower, upper, x, nearest, n, active, rounds, trace } = found;
         let Some(trace) = trace else {
             let found = common(x, rounds);
-            *warm = self.hint(&found);
+            warm.hint = self.hint(&found);
             return Ok(self.answer(&found, tolerance));
         };
-        *warm = Hint::EdgeShape(trace).into();
+        warm.hint = Hint::EdgeShape(trace);
         let bracket = Distance { lower, upper, iterations: rounds, ..Distance::default() };
         Ok(self.attained(bracket, tolerance, ([x, nearest, n], active)))
     }
@@ -145,7 +145,7 @@ impl<'a> Exact<'a> {
         }
         let found = dispatch(ExactContact { body, pose, form, form_pose, options })?;
         if found.upper == 0.0 {
-            *warm = self.hint(&found);
+            warm.hint = self.hint(&found);
         }
         Ok(self.answer(&found, 0.0))
     }
@@ -186,7 +186,7 @@ impl<'a> Exact<'a> {
 
     /// A hint for the general search.
     #[cold]
-    fn general_hint(&self, about: &ExactProven) -> WarmStart {
+    fn general_hint(&self, about: &ExactProven) -> Hint {
         let Self { free, shape, form, swapped } = *self;
         let own = |pose: &Pose, point: [f64; 3]| {
             pose.rotation().inverse_transform_vector(&(to_world(form, shape.1, point) - pose.translation()))
@@ -197,22 +197,22 @@ impl<'a> Exact<'a> {
         let into_a = |pose: &Pose, n: Vector3<f64>| pose.rotation().inverse_transform_vector(&n);
         if swapped {
             let normal_a = into_a(shape.1, -normal);
-            Hint::Apart { x_a: y, y_b: x, normal_a, active_a: of_form, active_b: 1 }.into()
+            Hint::Apart { x_a: y, y_b: x, normal_a, active_a: of_form, active_b: 1 }
         } else {
-            Hint::Apart { x_a: x, y_b: y, normal_a: into_a(free.1, normal), active_a: 1, active_b: of_form }.into()
+            Hint::Apart { x_a: x, y_b: y, normal_a: into_a(free.1, normal), active_a: 1, active_b: of_form }
         }
     }
 
-    fn hint(&self, found: &ExactProven) -> WarmStart {
+    fn hint(&self, found: &ExactProven) -> Hint {
         match found.trace {
-            Some(trace) => Hint::Exact(trace).into(),
+            Some(trace) => Hint::Exact(trace),
             None => {
                 // A common point, in the frame of the first body.
                 let Self { free, shape, form, swapped } = *self;
                 let world: Vector3<f64> = to_world(form, shape.1, found.x);
                 let (_, pose_a) = if swapped { shape } else { free };
                 let point_a = pose_a.rotation().inverse_transform_vector(&(world - pose_a.translation()));
-                Hint::Overlap { point_a }.into()
+                Hint::Overlap { point_a }
             }
         }
     }
@@ -233,7 +233,7 @@ pub(super) fn of_shapes(
     let (form_a, form_b) = (a.closed_form()?, b.closed_form()?);
     let (of_a, of_b) = ((form_a, pose_a), (form_b, pose_b));
     if let Some(found) = of_balls(of_a, of_b, options).or_else(|| of_ball_beside(of_a, of_b, options)) {
-        *warm = Hint::Shapes { x_a: *form_a.center() }.into();
+        warm.hint = Hint::Shapes { x_a: *form_a.center() };
         return Some(Ok(found));
     }
     let tolerance = options.accuracy() * a.circumscribed().radius.min(b.circumscribed().radius);
@@ -244,7 +244,7 @@ pub(super) fn of_shapes(
     };
     let ShapeDistance { lower, upper, common, witness_a, witness_b, normal, own_normals: [of_a, of_b], steps } = found;
     let point_a = pose_a.rotation().inverse_transform_vector(&(witness_a - pose_a.translation()));
-    *warm = Hint::Shapes { x_a: point_a }.into();
+    warm.hint = Hint::Shapes { x_a: point_a };
     let answer = Distance {
         status: Status::of(upper.max(0.0) - lower.max(0.0) <= tolerance),
         lower: lower.max(0.0),

@@ -13,6 +13,7 @@ mod search;
 use crate::body::{Body, PartNode, Solid};
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
+use crate::measure::other_parts::SeenSolids;
 use crate::measure::pairwise_minimum::{At, nearest as nearest_parts};
 use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -70,7 +71,9 @@ pub(super) fn distance_until(
     let radius = a.circumscribed().radius.min(b.circumscribed().radius);
     let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
     let (nodes_a, nodes_b) = (nodes(a, &own_a), nodes(b, &own_b));
-    let mut found = closest(((a.parts(), nodes_a), pose_a), ((b.parts(), nodes_b), pose_b), goal, (options, warm));
+    let (of_a, of_b) = ((a.parts(), nodes_a), (b.parts(), nodes_b));
+    let solids = SeenSolids::new((a, pose_a), (b, pose_b));
+    let mut found = closest(&solids, (of_a, pose_a), (of_b, pose_b), goal, (options, warm));
     found.status = Status::of(found.upper - found.lower <= options.accuracy() * radius);
     found
 }
@@ -80,18 +83,23 @@ type Parts<'a> = ((&'a [Body], &'a [PartNode]), &'a Pose);
 
 /// Not generic, so that it is compiled with this crate, whatever its callers are compiled for.
 fn closest(
+    solids: &SeenSolids<'_>,
     ((a, nodes_a), pose_a): Parts<'_>,
     ((b, nodes_b), pose_b): Parts<'_>,
     goal: &StopCriterion,
     (options, warm): (&Options<'_>, &mut WarmStart),
 ) -> Distance {
-    let trees = ball_gaps((nodes_a, pose_a), (nodes_b, pose_b));
+    let trees = ball_gaps(nodes_a, nodes_b, solids.seen);
     // Nothing is nearer than 0.
     let end = StopCriterion { near: goal.near.max(0.0), far: goal.far };
-    let found = nearest_parts(&trees, &end, warm, |(i, j), nearest, hint| {
-        let goal = StopCriterion { near: goal.near, far: goal.far.min(nearest) };
-        settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
-    });
+    let found =
+        nearest_parts(&trees, &end, solids.recall(warm.others.as_ref(), warm.parts), warm, |(i, j), nearest, hint| {
+            let goal = StopCriterion { near: goal.near, far: goal.far.min(nearest) };
+            settle((&a[i], pose_a), (&b[j], pose_b), &goal, options, hint)
+        });
+    if !found.is_recalled {
+        warm.others = Some(solids.kept(found.others, warm.parts));
+    }
     let tied = found.tied && found.best.normal.is_some();
     let parts = [found.parts.0 as u16, found.parts.1 as u16];
     Distance { lower: found.lower, parts, tied, iterations: found.iterations, ..found.best }

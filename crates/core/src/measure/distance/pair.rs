@@ -150,11 +150,11 @@ impl<'a> Query<'a> {
         {
             return match exact.distance(goal, options, &warm.hint) {
                 Ok((found, hint)) => {
-                    *warm = hint;
+                    warm.hint = hint;
                     found
                 }
                 Err((rounds, hint)) => {
-                    *warm = hint;
+                    warm.hint = hint;
                     self.search(&Lost::after(rounds), warm)
                 }
             };
@@ -213,7 +213,7 @@ impl<'a> Query<'a> {
         {
             return Some(self.overlapping(&common, 0, warm));
         }
-        *warm = WarmStart::default();
+        warm.hint = Hint::Cold;
         None
     }
 
@@ -221,7 +221,7 @@ impl<'a> Query<'a> {
     fn overlapping(&self, common: &CommonPoint, iterations: u32, warm: &mut WarmStart) -> Distance {
         let (a, pose_a) = self.of_a;
         let point_a = a.normalization().center + Vector3::from(common.v);
-        *warm = Hint::Overlap { point_a }.into();
+        warm.hint = Hint::Overlap { point_a };
         let witness = pose_a.transform_point(&point_a);
         Distance {
             status: Status::Converged,
@@ -264,7 +264,7 @@ impl<'a> Query<'a> {
         if !search.decided() {
             search.run(&warm.hint);
         }
-        *warm = search.hint();
+        warm.hint = search.hint();
         search.answer()
     }
 
@@ -375,7 +375,7 @@ impl WithSimd for Cold<'_> {
         let mut trace = Trace::default();
         match (Seek { a, b, relation, from: None, most, options, trace: &mut trace }).with_simd(simd) {
             Ok(proven) => {
-                *warm = Hint::Smooth(trace).into();
+                warm.hint = Hint::Smooth(trace);
                 let proven = Proven { rounds: before + proven.rounds, ..proven };
                 query.answer(simd, &proven, relation.tolerance)
             }

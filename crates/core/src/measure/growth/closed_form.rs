@@ -29,7 +29,7 @@ pub(super) fn of_shapes(
     if !(upper - lower <= options.accuracy() * upper.max(1.0)) {
         return Err(found.steps);
     }
-    *warm = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.of_a) }.into();
+    warm.hint = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.of_a) };
     // Against the vector from A's centre to B's.
     let slope = normal / found.width;
     Ok(GrowthDistance {

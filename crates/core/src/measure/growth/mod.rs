@@ -33,6 +33,7 @@ use crate::body::{Body, PartCenters, PartNode, Solid};
 use crate::measure::bounds::culling::CULLING_SLACK;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
+use crate::measure::other_parts::Recalled;
 use crate::measure::pairwise_minimum::nearest;
 use crate::measure::part_pairs::{NodeBound, SeenFrame, TreePair, centers, nodes, only_centers, only_node};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -102,7 +103,7 @@ fn first_to_touch(
     let seen = SeenFrame::new(pose_a, pose_b);
     let bound = |i: usize, j: usize| NodeBound::of(growth_bound(&seen, &centers_a[i], &centers_b[j]));
     let trees = TreePair::new(nodes_a, nodes_b, bound);
-    let found = nearest(&trees, &StopCriterion::NARROW, warm, |(i, j), _, hint| {
+    let found = nearest(&trees, &StopCriterion::NARROW, Recalled::NOTHING, warm, |(i, j), _, hint| {
         between((&a[i], pose_a), (&b[j], pose_b), options, hint)
     });
     let narrow = found.best.upper - found.lower <= options.accuracy() * found.best.upper.max(1.0);

@@ -66,7 +66,7 @@ fn by_search(
         let mut trace = Trace::default();
         match dispatch(Seek { a, b, relation: along, from: None, most, options, trace: &mut trace }) {
             Ok(proven) => {
-                *warm = Hint::Smooth(trace).into();
+                warm.hint = Hint::Smooth(trace);
                 let answer = along.answer(a, pose_a, pose_b, &proven);
                 return GrowthDistance { iterations: spent + proven.rounds, ..answer };
             }
@@ -107,7 +107,7 @@ fn by_search(
     };
     search.run(&warm.hint);
     if let Some(hint) = search.hint() {
-        *warm = hint;
+        warm.hint = hint;
     }
     search.answer(pose_a, pose_b)
 }
@@ -323,9 +323,9 @@ impl Search<'_> {
         better
     }
 
-    fn hint(&self) -> Option<WarmStart> {
+    fn hint(&self) -> Option<Hint> {
         let n = -self.n?.try_normalize(0.0)?;
-        Some(WarmStart::apart(self.frame.pair, [&self.x, &self.y, &n], &self.active))
+        Some(Hint::apart(self.frame.pair, [&self.x, &self.y, &n], &self.active))
     }
 
     fn answer(&self, pose_a: &Pose, pose_b: &Pose) -> GrowthDistance {

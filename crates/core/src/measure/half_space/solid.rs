@@ -82,14 +82,14 @@ impl Ask<'_> {
             let rough = height(body, &above.down, asked, known, options);
             proven = both(proven, above.bracket(&rough));
             if goal.met(proven[0], proven[1]) {
-                *warm = Hint::Single { y: rough.point, active: rough.active }.into();
+                warm.hint = Hint::Single { y: rough.point, active: rough.active };
                 return answer(proven, &rough.point, rough.iterations);
             }
             (start, spent) = (Some(SupportPoint { x: rough.point, active: rough.active }), rough.iterations);
         }
         // The other half is left to roundings: of the surface, and of where the body stands.
         let found = height(body, &above.down, Asked::narrow(0.5 * tolerance), start, &options.after(spent));
-        *warm = Hint::Single { y: found.point, active: found.active }.into();
+        warm.hint = Hint::Single { y: found.point, active: found.active };
         answer(both(proven, above.bracket(&found)), &found.point, spent + found.iterations)
     }
 }

@@ -7,7 +7,7 @@ use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
 use crate::measure::solver::exact_shape::{LevelMinimum, LevelQuery, active, direction_to_world, to_world};
 use crate::measure::status::Status;
-use crate::measure::warm::{Hint, WarmStart};
+use crate::measure::warm::Hint;
 use crate::polynomial::dispatch;
 use nalgebra::Vector3;
 
@@ -32,12 +32,7 @@ impl<'a> OverShape<'a> {
     ///
     /// # Errors
     /// After how many evaluations the general search has to go on.
-    pub(super) fn solve(
-        &self,
-        hint: &Hint,
-        options: &Options<'_>,
-        spent: u32,
-    ) -> Result<(LevelDistance, WarmStart), u32> {
+    pub(super) fn solve(&self, hint: &Hint, options: &Options<'_>, spent: u32) -> Result<(LevelDistance, Hint), u32> {
         let Self { of_a: (body, pose), of_b: (_, form_pose), form } = *self;
         let from = if let Hint::Level { x_b, .. } = hint { Some(*x_b) } else { None };
         let options = &options.after(spent);
@@ -45,7 +40,7 @@ impl<'a> OverShape<'a> {
         Ok(self.answer(&found, spent))
     }
 
-    fn answer(&self, found: &LevelMinimum, spent: u32) -> (LevelDistance, WarmStart) {
+    fn answer(&self, found: &LevelMinimum, spent: u32) -> (LevelDistance, Hint) {
         let Self { of_a: (_, pose), of_b: (_, form_pose), form } = *self;
         let witness = to_world(form, form_pose, found.y);
         let gradient = direction_to_world(form, form_pose, found.gradient);
@@ -64,6 +59,6 @@ impl<'a> OverShape<'a> {
             tied: false,
             iterations: spent + found.rounds,
         };
-        (answer, Hint::Level { x_b, active_a: 1, active_b }.into())
+        (answer, Hint::Level { x_b, active_a: 1, active_b })
     }
 }

@@ -47,7 +47,7 @@ pub(super) fn between(
     {
         match over.solve(&warm.hint, options, spent) {
             Ok((answer, hint)) => {
-                *warm = hint;
+                warm.hint = hint;
                 return answer;
             }
             Err(rounds) => spent += rounds,
@@ -55,7 +55,7 @@ pub(super) fn between(
         if runs(Stage::Saturation)
             && let Some(answer) = saturated(a, pose_a, b, pose_b, options)
         {
-            *warm = Hint::Saturated.into();
+            warm.hint = Hint::Saturated;
             return LevelDistance { iterations: spent, ..answer };
         }
     }
@@ -66,7 +66,7 @@ pub(super) fn between(
         && runs(Stage::Saturation)
         && let Some(answer) = saturated(a, pose_a, b, pose_b, options)
     {
-        *warm = Hint::Saturated.into();
+        warm.hint = Hint::Saturated;
         return LevelDistance { iterations: spent, ..answer };
     }
     if let Some(start) = &start
@@ -76,7 +76,7 @@ pub(super) fn between(
         let most = SEEK_ROUNDS.min(options.max_iterations() - spent);
         match dispatch(SeekLevel { a, pose_a, b, pose_b, from: &pair.to_b(&start.x), most, options }) {
             Ok((proven, trace)) => {
-                *warm = Hint::LevelSmooth(trace).into();
+                warm.hint = Hint::LevelSmooth(trace);
                 let rounds = spent + proven.rounds;
                 return LevelDistance { iterations: rounds, ..proven.answer(a, pose_a, pose_b) };
             }
@@ -88,7 +88,7 @@ pub(super) fn between(
         search.resume(settled);
     }
     search.run(&warm.hint, start.as_ref());
-    *warm = search.hint().into();
+    warm.hint = search.hint();
     search.answer(pose_a, pose_b)
 }
 

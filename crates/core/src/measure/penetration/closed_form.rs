@@ -36,7 +36,7 @@ pub(super) fn of_shapes(
     let found = match signed_of_shapes((form_a, pose_a), (form_b, pose_b), ELSEWHERE, how)? {
         SignedShapes::Apart(n) => {
             let (witness_a, witness_b) = (farthest((form_a, pose_a), -n), farthest((form_b, pose_b), n));
-            *warm = Hint::Shapes { x_a: pose_a.inverse_transform_point(&witness_a) }.into();
+            warm.hint = Hint::Shapes { x_a: pose_a.inverse_transform_point(&witness_a) };
             return Some(Penetration { witness_a, witness_b, ..apart });
         }
         SignedShapes::Signed(found) => found,
@@ -47,7 +47,7 @@ pub(super) fn of_shapes(
     if upper - lower > tolerance || upper > 0.0 && !(found.is_aligned || tied) {
         return None;
     }
-    *warm = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.witness_a) }.into();
+    warm.hint = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.witness_a) };
     Some(Penetration {
         lower,
         upper,

@@ -9,8 +9,9 @@ mod tests;
 use crate::body::Solid;
 use crate::measure::frames::pose::Pose;
 use crate::measure::options::Options;
+use crate::measure::other_parts::Recalled;
 use crate::measure::pairwise_minimum::{Least, nearest};
-use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
+use crate::measure::part_pairs::{SeenFrame, ball_gaps, nodes, only_node};
 use crate::measure::signed::separating_translation::{self, Start, Starts};
 use crate::measure::solver::depth::local_search::solid_tolerance;
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -23,7 +24,7 @@ use pair::between;
 ///
 /// The bracket is as narrow as `options` ask, relative to the depth
 /// ([`Options::with_depth_accuracy`]), or the status says that it is not: with many equally short
-/// directions and an accuracy beyond about 1e-4 the table of directions is full first. `upper` is
+/// directions and an accuracy beyond about 1e-4 the iterations end first. `upper` is
 /// as accurate as a distance wherever its direction is the best: the bracket is about the others.
 /// `warm` is read and then replaced by the hint for the next query of this pair.
 ///
@@ -67,15 +68,16 @@ pub fn penetration(
     }
     let (mut starts, mut directions) = (Starts::default(), 0);
     let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
-    let trees = ball_gaps((nodes(a, &own_a), pose_a), (nodes(b, &own_b), pose_b));
-    let Least { best, iterations, .. } = nearest(&trees, &StopCriterion::NARROW, warm, |pair, _, hint| {
-        let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
-        directions += found.directions;
-        if let Some(direction) = found.direction {
-            starts.push(Start { pair, direction, depth: found.upper });
-        }
-        found
-    });
+    let trees = ball_gaps(nodes(a, &own_a), nodes(b, &own_b), SeenFrame::new(pose_a, pose_b));
+    let Least { best, iterations, .. } =
+        nearest(&trees, &StopCriterion::NARROW, Recalled::NOTHING, warm, |pair, _, hint| {
+            let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
+            directions += found.directions;
+            if let Some(direction) = found.direction {
+                starts.push(Start { pair, direction, depth: found.upper });
+            }
+            found
+        });
     if starts.is_empty() {
         return Penetration { directions, iterations, ..best };
     }

@@ -29,7 +29,7 @@ pub(super) fn between(
     best.follow(&warm.hint);
     let proof = prove(&mut best);
     if let Some(hint) = best.hint() {
-        *warm = hint;
+        warm.hint = hint;
     }
     let apart = best.depth <= 0.0;
     let upper = best.depth.max(0.0);

@@ -30,7 +30,7 @@ pub(super) fn of_shapes(
         if upper - lower > tolerance || !(found.is_aligned || tied) {
             return Err(found.steps);
         }
-        *warm = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.witness_a) }.into();
+        warm.hint = Hint::Shapes { x_a: pose_a.inverse_transform_point(&found.witness_a) };
         let answer = Answer { lower, upper, tied, iterations: found.steps, status: Status::Converged };
         return Ok(answer.report((found.witness_a, found.witness_b), Some(found.normal), pose_a, pose_b));
     }
@@ -44,7 +44,7 @@ pub(super) fn of_shapes(
     if !(apart.lower > 0.0) || apart.status != Status::Converged {
         return Err(apart.iterations);
     }
-    *warm = hint;
+    warm.hint = hint.hint;
     let (lower, upper, iterations, status) = (apart.lower, apart.upper, apart.iterations, apart.status);
     let answer = Answer { lower, upper, tied: false, iterations, status };
     Ok(answer.report((apart.witness_a, apart.witness_b), apart.normal, pose_a, pose_b))

@@ -21,6 +21,7 @@ use crate::body::Solid;
 use crate::measure::frames::pose::Pose;
 use crate::measure::frames::twist::Twist;
 use crate::measure::options::Options;
+use crate::measure::other_parts::SeenSolids;
 use crate::measure::pairwise_minimum::{Least, nearest};
 use crate::measure::part_pairs::{ball_gaps, nodes, only_node};
 use crate::measure::solver::depth::local_search::solid_tolerance;
@@ -79,15 +80,25 @@ pub fn signed_distance(
     }
     let mut starts = Starts::default();
     let (own_a, own_b) = (only_node(a.circumscribed()), only_node(b.circumscribed()));
-    let trees = ball_gaps((nodes(a, &own_a), pose_a), (nodes(b, &own_b), pose_b));
-    let found = nearest(&trees, &StopCriterion::NARROW, warm, |pair, _, hint| {
-        let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
-        if let Some(direction) = found.normal.filter(|_| found.lower <= 0.0) {
-            starts.push(Start { pair, direction, depth: -found.lower });
-        }
-        found
-    });
+    let solids = SeenSolids::new((a, pose_a), (b, pose_b));
+    let trees = ball_gaps(nodes(a, &own_a), nodes(b, &own_b), solids.seen);
+    let found = nearest(
+        &trees,
+        &StopCriterion::NARROW,
+        solids.recall(warm.others.as_ref(), warm.parts),
+        warm,
+        |pair, _, hint| {
+            let found = between((&parts_a[pair.0], pose_a), (&parts_b[pair.1], pose_b), options, hint);
+            if let Some(direction) = found.normal.filter(|_| found.lower <= 0.0) {
+                starts.push(Start { pair, direction, depth: -found.lower });
+            }
+            found
+        },
+    );
     let Least { best, lower, tied, iterations, .. } = found;
+    if !found.is_recalled {
+        warm.others = Some(solids.kept(found.others, warm.parts));
+    }
     if lower > 0.0 || starts.is_empty() {
         let status = Status::of(best.upper - lower <= solid_tolerance(a, b, options, 0.0));
         return SignedDistance { status, lower, tied: tied || best.tied, iterations, ..best };

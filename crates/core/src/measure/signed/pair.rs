@@ -92,7 +92,7 @@ pub(super) fn between(
         }
     }
     if let Some(hint) = best.hint() {
-        *warm = hint;
+        warm.hint = hint;
     }
     if known.upper > 0.0 && !known.narrow(&best) {
         // On which side of contact the bodies are is not known, or how far apart.

@@ -17,7 +17,7 @@ use crate::measure::frames::pose::Pose;
 use crate::measure::half_space::{HalfSpace, distance_to_half_space};
 use crate::measure::options::Options;
 use crate::measure::pairwise_minimum::At;
-use crate::measure::part_pairs::{NodeBound, TreePair, ball_gaps, nodes, only_node};
+use crate::measure::part_pairs::{NodeBound, SeenFrame, TreePair, ball_gaps, nodes, only_node};
 use crate::measure::solver::depth::local_search::{ELSEWHERE, solid_tolerance};
 use crate::measure::solver::min_norm_point::{Bound, Shortest, shortest};
 use crate::measure::solver::stop_criterion::StopCriterion;
@@ -182,7 +182,7 @@ impl<'a> Search<'a> {
     /// The trees with the gaps of their balls, A being at this pose.
     fn trees(&self, pose: &Pose) -> TreePair<'a, impl Fn(usize, usize) -> NodeBound + use<'a>> {
         let [a, b] = self.nodes;
-        ball_gaps((a, pose), (b, &self.pose_b))
+        ball_gaps(a, b, SeenFrame::new(pose, &self.pose_b))
     }
 
     /// The translation that separates the circumscribed balls.

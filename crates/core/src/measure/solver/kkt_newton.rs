@@ -19,7 +19,9 @@ use crate::measure::solver::active_constraints::{ActiveConstraints, ActiveSet, M
 use crate::measure::solver::kkt_system::{Curved, DistanceSystem, Residuals};
 use crate::measure::solver::linear_systems::solve;
 use crate::measure::solver::step_acceleration::{Series, Taken, across, along, tangents};
-use crate::measure::solver::tangent_newton::{ALIGNED, LONGEST_MOVE, PATIENCE, SEEK_ROUNDS, WORTH_A_BRACKET};
+use crate::measure::solver::tangent_newton::{
+    ALIGNED, LONGEST_MOVE, PATIENCE, SEEK_ROUNDS, WORTH_A_BRACKET, aligned_angle,
+};
 use crate::polynomial::Scalar;
 use nalgebra::{Matrix3, Vector3};
 
@@ -375,18 +377,19 @@ impl DistanceNewton {
         limit
     }
 
-    /// Whether the normal is that of the solution, to [`ALIGNED`] or to what rounding leaves of so
-    /// short a distance. The narrowest of brackets determines it to about the root of its width
+    /// Whether the normal is that of the solution, to [`aligned_angle`] or to what rounding leaves
+    /// of so short a distance. The narrowest of brackets determines it to about the root of its width
     /// relative to the distance; the equations determine it fully: n is along x - y and what the
     /// constraints of each body carry, none of them is violated, and those with a multiplier above
     /// 0 are met with equality.
     pub(in crate::measure) fn is_aligned(&self, pair: &Pair<'_>) -> bool {
+        let angle = aligned_angle(&[pair.a.body, pair.b.body]);
         let (n, apart) = (self.n.normalize(), self.x - self.y);
         let (turned_a, gap_a) = self.a.misfit(&pair.a, &self.x, &-n);
         let (turned_b, gap_b) = self.b.misfit(&pair.b, &self.y, &n);
         let across = (apart - n * n.dot(&apart)).norm();
-        let enough = (ALIGNED * apart.norm()).max(ROUNDED * pair.size());
-        turned_a <= ALIGNED && turned_b <= ALIGNED && across + gap_a + gap_b <= enough
+        let enough = (angle * apart.norm()).max(ROUNDED * pair.size());
+        turned_a <= angle && turned_b <= angle && across + gap_a + gap_b <= enough
     }
 
     /// Turns the normal along x - y: of corners and edges that hold both points where they are it

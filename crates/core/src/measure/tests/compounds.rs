@@ -1,7 +1,7 @@
 //! Unions against loops over the pairs of their parts.
 
 use super::{random_pose, twisted};
-use crate::body::{Body, Compound, NodeContent, PartTree, Solid};
+use crate::body::{Ball, Body, Compound, NodeContent, PartTree, Solid};
 use crate::measure::growth::growth_bound;
 use crate::measure::level::level_bound;
 use crate::measure::part_pairs::SeenFrame;
@@ -364,6 +364,85 @@ fn few_of_many_parts_are_touched() {
                 assert!(bounds < pairs as f64 * 0.75 && solved < few, "{name}: {bounds} bounds, {solved} solved");
             }
         }
+    }
+}
+
+/// The bound of a motion holds for points of the ball, from turns of nearly nothing to half a turn
+/// and at any offset, and is not far above the longest way.
+#[test]
+fn balls_move_no_farther_than_their_bound() {
+    for seed in 0..2000 {
+        let mut random = Seeded(18_500 + seed);
+        let offset = 10_f64.powf(random.between(-3.0, 6.0));
+        let (pose_a, far) = (random_pose(&mut random, 1.0), random.unit() * offset);
+        let before = random_pose(&mut random, 0.0).with_translation(pose_a.translation() + far);
+        let angle = 10_f64.powf(random.between(-9.0, 0.49));
+        let step = random.unit() * 10_f64.powf(random.between(-9.0, 1.0));
+        let turn = UnitQuaternion::from_scaled_axis(random.unit() * angle);
+        let turned = (turn * before.rotation()).coords;
+        let after =
+            Pose::from_quaternion(before.translation() + step, [turned.x, turned.y, turned.z, turned.w]).unwrap();
+        let ball = Ball { center: random.unit() * random.positive(), radius: random.between(0.01, 3.0) };
+        let [seen, now] = [&before, &after].map(|pose| SeenFrame::new(&pose_a, pose));
+        let bound = now.moved_since(&seen, &ball);
+        let mut longest = 0.0_f64;
+        for _ in 0..50 {
+            let x = ball.center + random.unit() * ball.radius;
+            longest = longest.max((after.transform_point(&x) - before.transform_point(&x)).norm());
+        }
+        let rounding = 4.0 * f64::EPSILON * (offset + 5.0);
+        assert!(longest <= bound + rounding, "seed {seed}: {longest} {bound}");
+        assert!(bound <= 3.0 * longest + 1e-12 * (offset + 5.0), "seed {seed}: {longest} {bound}");
+    }
+}
+
+/// Along motions of small steps the bound of the other parts spares their search, and changes no
+/// answer: neither of distances and signed distances, nor of decisions, nor where other solids take
+/// the hint over.
+#[test]
+fn other_parts_are_left_out_along_motions() {
+    let options = Options::default();
+    for (step, most) in [(1e-4, 0.6), (1e-3, 0.7), (1e-2, 0.9), (0.3, 1.05)] {
+        let (mut kept, mut forgotten) = ([0; 2], [0; 2]);
+        for seed in 0..10 {
+            let mut random = Seeded(19_000 + seed);
+            let (a, b, other) = (cloud(&mut random, 16), cloud(&mut random, 12), cloud(&mut random, 12));
+            let pose_a = random_pose(&mut random, 1.0);
+            let start = random.unit() * (2.4 + 1.2 * random.signed());
+            let (go, turn) = (random.unit() * step, random.unit() * step);
+            let (mut warm, mut plain) = (WarmStart::default(), WarmStart::default());
+            for k in 0..40 {
+                let turned = UnitQuaternion::from_scaled_axis(turn * f64::from(k));
+                let q = turned.coords;
+                let place = pose_a.translation() + start + go * f64::from(k);
+                let pose_b = Pose::from_quaternion(place, [q.x, q.y, q.z, q.w]).unwrap();
+                let b = if k == 20 { &other } else { &b };
+                let label = format!("step {step}, seed {seed}, {k}");
+                plain.others = None;
+                let (found, with) = touched(|| distance(&a, &pose_a, b, &pose_b, &options, &mut warm));
+                let (expected, without) = touched(|| distance(&a, &pose_a, b, &pose_b, &options, &mut plain));
+                assert!(
+                    found.lower <= expected.upper && expected.lower <= found.upper,
+                    "{label}: {found:?} {expected:?}"
+                );
+                for i in 0..2 {
+                    kept[i] += with[i];
+                    forgotten[i] += without[i];
+                }
+                let far = nearer_than(&a, &pose_a, b, &pose_b, 0.9 * expected.lower, &options, &mut warm);
+                assert!(expected.lower == 0.0 || far == Ok(Decision::No), "{label}: {far:?}");
+                let near = nearer_than(&a, &pose_a, b, &pose_b, 1.1 * expected.upper, &options, &mut warm);
+                assert!(expected.upper == 0.0 || near == Ok(Decision::Yes), "{label}: {near:?}");
+                if k % 10 == 0 {
+                    let signed = signed_distance(&a, &pose_a, b, &pose_b, &options, &mut warm);
+                    let cold = signed_distance(&a, &pose_a, b, &pose_b, &options, &mut WarmStart::default());
+                    assert!(signed.lower <= cold.upper && cold.lower <= signed.upper, "{label}: {signed:?} {cold:?}");
+                }
+            }
+        }
+        let share = f64::from(kept[1]) / f64::from(forgotten[1]);
+        println!("steps of {step}: {kept:?} bounds and pairs, {forgotten:?} without: {share:.2}");
+        assert!(share <= most, "{share} of the pairs at steps of {step}");
     }
 }
 

@@ -6,7 +6,7 @@ use crate::measure::frames::query_frame::Posed;
 use crate::measure::solver::continuation::Trace;
 use crate::measure::solver::kkt_newton::Active;
 use crate::measure::status::Status;
-use crate::measure::warm::{Hint, WarmStart};
+use crate::measure::warm::Hint;
 use nalgebra::Vector3;
 
 impl Search<'_> {
@@ -20,13 +20,13 @@ impl Search<'_> {
         (self.y, (self.upper > 0.0).then_some(self.active))
     }
 
-    pub(in crate::measure::distance) fn hint(&self) -> WarmStart {
+    pub(in crate::measure::distance) fn hint(&self) -> Hint {
         if self.upper == 0.0 {
-            Hint::Overlap { point_a: self.pair.to_a(&self.x) }.into()
+            Hint::Overlap { point_a: self.pair.to_a(&self.x) }
         } else if let Some(trace) = self.trace() {
-            Hint::Smooth(trace).into()
+            Hint::Smooth(trace)
         } else {
-            WarmStart::apart(self.pair, [&self.x, &self.y, &self.n], &self.active)
+            Hint::apart(self.pair, [&self.x, &self.y, &self.n], &self.active)
         }
     }
 

@@ -12,7 +12,7 @@ use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::support_point::{SupportPoint, support_of_a, support_of_b};
 use crate::measure::solver::tangent_newton::SEEK_ROUNDS;
 use crate::measure::solver::two_point_problem::Through;
-use crate::measure::warm::{Hint, WarmStart};
+use crate::measure::warm::Hint;
 use crate::polynomial::dispatch;
 use nalgebra::{Vector2, Vector3};
 
@@ -350,9 +350,9 @@ impl<'a> Best<'a> {
         (self.attained, self.trace, self.settled) = (None, None, false);
     }
 
-    pub(in crate::measure) fn hint(&self) -> Option<WarmStart> {
-        let apart = |n: &Vector3<f64>| WarmStart::apart(self.pair, [&self.x, &self.y, n], &self.active);
-        self.n.as_ref().map(|n| self.trace.map_or_else(|| apart(n), |trace| Hint::Smooth(trace).into()))
+    pub(in crate::measure) fn hint(&self) -> Option<Hint> {
+        let apart = |n: &Vector3<f64>| Hint::apart(self.pair, [&self.x, &self.y, n], &self.active);
+        self.n.as_ref().map(|n| self.trace.map_or_else(|| apart(n), Hint::Smooth))
     }
 
     /// Width of a bracket asked for.

@@ -55,6 +55,8 @@ pub(super) struct Cell {
 pub(super) struct Covering<const N: usize> {
     directions: [Direction; N],
     len: usize,
+    /// How many directions were dropped.
+    dropped: usize,
     /// A heap in two halves.
     cells: [[Cell; N]; 2],
     open: usize,
@@ -66,11 +68,50 @@ impl<const N: usize> Covering<N> {
     #[inline(always)]
     pub(super) fn new() -> Self {
         let (blank, cell) = (Direction::default(), Cell::default());
-        Self { directions: [blank; N], len: 0, cells: [[cell; N]; 2], open: 0, middles: [[0; N]; 2] }
+        Self { directions: [blank; N], len: 0, dropped: 0, cells: [[cell; N]; 2], open: 0, middles: [[0; N]; 2] }
     }
 
     pub(super) fn directions(&self) -> &[Direction] {
         &self.directions[..self.len]
+    }
+
+    /// How many directions were added.
+    pub(super) fn added(&self) -> usize {
+        self.len + self.dropped
+    }
+
+    /// Drops the directions that are no corner of an open triangle, but for the first one and
+    /// `kept`.
+    pub(super) fn compact(&mut self, kept: [Option<usize>; 2]) {
+        // Where a direction is from now on; 0 for nowhere, where it is not the first.
+        let mut place = [0; N];
+        for corner in (0..self.open).flat_map(|i| self.cell(i).corners) {
+            place[usize::from(corner)] = u16::MAX;
+        }
+        let len = self.len;
+        let stays = |i: usize, place: u16| i == 0 || place != 0 || kept.contains(&Some(i));
+        (self.len, self.middles) = (0, [[0; N]; 2]);
+        for i in 0..len {
+            if !stays(i, place[i]) {
+                continue;
+            }
+            place[i] = self.len as u16;
+            // The ends of an edge come before its middle. What has lost one is the middle of none.
+            let mut direction = self.directions[i];
+            let is_lost = |end: u16| end != 0 && place[usize::from(end)] == 0;
+            let is_middle = direction.parents != [0; 2] && !direction.parents.into_iter().any(is_lost);
+            direction.parents = if is_middle { direction.parents.map(|end| place[usize::from(end)]) } else { [0; 2] };
+            if is_middle {
+                self.add_middle(direction);
+            } else {
+                self.add(direction);
+            }
+        }
+        self.dropped += len - self.len;
+        for i in 0..self.open {
+            let cell = self.cell(i);
+            self.set(i, Cell { corners: cell.corners.map(|corner| place[usize::from(corner)]), ..cell });
+        }
     }
 
     /// Whether `splits` of the open triangles, or all if there are fewer, can be split.
@@ -206,6 +247,12 @@ impl<const N: usize> Covering<N> {
         self.set(at, cell);
     }
 
+    /// Takes out the last triangle of the heap, which mostly was opened late.
+    pub(super) fn pop_late(&mut self) -> Option<Cell> {
+        self.open = self.open.checked_sub(1)?;
+        Some(self.cell(self.open))
+    }
+
     /// Takes out the triangle with the lowest bound.
     pub(super) fn pop(&mut self) -> Option<Cell> {
         if self.open == 0 {
@@ -324,6 +371,33 @@ mod tests {
                 assert!(lower_bound(n, w, close).is_ok(), "seed {seed}: {close} not found below {least}, size {size}");
             }
         }
+    }
+
+    #[test]
+    fn compaction_keeps_open_triangles_and_the_middles_of_their_edges() {
+        let mut random = Seeded(7);
+        let mut covering = Covering::<64>::new();
+        let mut direction = |parents: [u16; 2]| Direction { n: random.unit(), parents, ..Direction::default() };
+        for _ in 0..6 {
+            covering.add(direction([0; 2]));
+        }
+        // Of the middles of edges 1-2 and 3-4 the first one has a middle of its own, with corner 1.
+        let middles = [[1, 2], [3, 4]].map(|ends| covering.add_middle(direction(ends)));
+        let inner = covering.add_middle(direction([1, middles[0]]));
+        covering.push(Cell { corners: [1, middles[0], inner], guess: 2.0 });
+        covering.push(Cell { corners: [1, 5, inner], guess: 1.0 });
+        let before = *covering.directions().first_chunk::<9>().unwrap();
+        // Dropped: 2, 3 and the middle of 3-4. Kept beside all corners: the first one, and 4.
+        covering.compact([Some(4), None]);
+        let after: Vec<_> = covering.directions().iter().map(|direction| direction.n).collect();
+        assert_eq!(after, [0, 1, 4, 5, 6, 8].map(|i: usize| before[i].n));
+        assert_eq!(covering.added(), 9);
+        let corners: Vec<_> = covering.cells().map(|cell| (cell.corners, cell.guess)).collect();
+        assert_eq!(corners, [([1, 3, 5], 1.0), ([1, 4, 5], 2.0)]);
+        // The edge 1-2 is gone, and its middle is the middle of none.
+        assert_eq!(covering.middle(1, 4), Some(5));
+        assert_eq!(covering.directions()[4].parents, [0; 2]);
+        assert_eq!((covering.middle(2, 3), covering.middle(1, 3)), (None, None));
     }
 
     #[test]

@@ -39,14 +39,31 @@ pub(in crate::measure) fn prove(best: &mut Best<'_>) -> Proof {
     }
     // With a table of directions that costs little to lay out and serves nearly all pairs, then
     // with one for ties.
-    match sweep::<128>(best) {
+    match sweep::<FEW>(best) {
         (proof, true) if !best.options.exhausted(best.iterations) => {
-            let (more, _) = sweep::<2048>(best);
+            let (more, _) = sweep::<MANY>(best);
             Proof { lower: more.lower.max(proof.lower), directions: more.directions + proof.directions, ..more }
         }
         (proof, _) => proof,
     }
 }
+
+/// Directions in the smaller table and in the larger one, which drops those that it no longer needs
+/// when it is full.
+///
+/// More, a proof lays out more memory; fewer, the larger table is needed more often, and ties of
+/// directions that were dropped are missed.
+const FEW: usize = 128;
+const MANY: usize = 2048;
+
+/// How many times triangles are split, as many as there are lanes, in one iteration.
+const GROUPS: usize = 8;
+
+/// Iterations that the larger table has to have room for: with less, triangles are closed one by
+/// one.
+///
+/// More, triangles of low bounds are split later; fewer, closing one triangle may fill the table.
+const RESERVE: usize = 4;
 
 /// Sweeps the sphere of directions until the bracket is narrow; also says whether the table was
 /// full first.
@@ -65,11 +82,11 @@ fn sweep<const N: usize>(best: &mut Best<'_>) -> (Proof, bool) {
     if best.depth > 0.0 && !best.settled {
         best.settle();
     }
-    let lower = if sweep.covering.directions().len() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
+    let lower = if sweep.covering.added() < 6 || best.depth <= 0.0 { 0.0 } else { lower.max(0.0) };
     let proof = Proof {
         lower: lower.min(best.depth.max(0.0)),
         tied: sweep.tied(best),
-        directions: sweep.covering.directions().len() as u32,
+        directions: sweep.covering.added() as u32,
     };
     (proof, full)
 }
@@ -122,16 +139,20 @@ impl<const N: usize> Sweep<'_, N> {
             self.open([sign(0), sign(1), sign(2)], best);
         }
         loop {
+            if N == MANY && !self.covering.has_room(GROUPS * MAX_LANES) {
+                self.covering.compact(self.shallowest(best));
+            }
+            // Those of the lowest bounds would all stay open at once.
+            let is_short = N == MANY && !self.covering.has_room(RESERVE * GROUPS * MAX_LANES);
             let before = self.covering.directions().len();
-            // Eight groups are one iteration.
-            for _ in 0..8 {
+            for _ in 0..GROUPS {
                 if best.depth <= 0.0 || self.covering.is_closed() {
                     return Some(());
                 }
                 if !self.covering.has_room(MAX_LANES) {
                     return None;
                 }
-                if !self.split(best) {
+                if !self.split(best, is_short) {
                     return Some(());
                 }
             }
@@ -267,14 +288,14 @@ impl<const N: usize> Sweep<'_, N> {
         });
     }
 
-    /// Splits the lowest triangles, as many as their support points are found together, the same on
-    /// every machine; false if that cannot be done, all staying as it is.
-    fn split(&mut self, best: &Best<'_>) -> bool {
+    /// Splits the lowest triangles, or those opened late, as many as their support points are found
+    /// together, the same on every machine; false if that cannot be done, all staying as it is.
+    fn split(&mut self, best: &Best<'_>, are_late: bool) -> bool {
         // Each with the middle of its widest edge if that is known, else where it is wanted.
         let (mut cells, mut count) = ([None; MAX_LANES], 0);
         let (mut wanted, mut missing) = ([Wanted { n: Vector3::zeros(), between: None }; MAX_LANES], 0);
         while count < MAX_LANES
-            && let Some(cell) = self.covering.pop()
+            && let Some(cell) = if are_late { self.covering.pop_late() } else { self.covering.pop() }
         {
             let ([i, j, k], n) = self.covering.widest_edge(cell.corners);
             let between = Some([i.min(j), i.max(j)]);
@@ -303,6 +324,17 @@ impl<const N: usize> Sweep<'_, N> {
             self.open([middle, j, k], best);
         }
         true
+    }
+
+    /// The directions along which the bodies are least deep: of all, and of those far from the best.
+    fn shallowest(&self, best: &Best<'_>) -> [Option<usize>; 2] {
+        let directions = self.covering.directions();
+        let least = |far: &dyn Fn(&Direction) -> bool| {
+            let others = (0..directions.len()).filter(|&i| far(&directions[i]));
+            others.min_by(|&i, &j| directions[i].depth().total_cmp(&directions[j].depth()))
+        };
+        let is_far = |direction: &Direction| best.n.is_some_and(|n| direction.n.dot(&n) < ELSEWHERE);
+        [least(&|_| true), least(&is_far)]
     }
 
     /// Whether a direction far from the best is about as good, or one near it may be better.

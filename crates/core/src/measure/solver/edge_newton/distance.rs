@@ -20,7 +20,7 @@ use crate::measure::solver::predictor::Drift;
 use crate::measure::solver::prospect::Prospect;
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{
-    Bracket, LONGEST_MOVE, Relative, SEEK_ROUNDS, Side, Step, TAYLOR_ROUNDING, bracket, moved,
+    ALIGNED_AT_EDGES, Bracket, LONGEST_MOVE, Relative, SEEK_ROUNDS, Side, Step, TAYLOR_ROUNDING, bracket, moved,
 };
 use crate::measure::solver::two_point_problem::{Apart, Relation, Verdict};
 use crate::polynomial::{Simd, WithSimd};
@@ -35,14 +35,6 @@ pub(super) const VIOLATED: f64 = 1e-13;
 /// has, and far more than rounding leaves of that of a flat side, so that a program with no other
 /// curvature leads along the side to its end. It changes time only; no test pins it.
 pub(super) const FLATTEST: f64 = 1e-10;
-
-/// Largest angle between the normals of two sides, radians, that an answer is taken at. Between
-/// edges bodies may be flatter than smooth ones: near contact an angle stands for a longer way
-/// along the sides.
-///
-/// Larger, gradients near contact are off by more than 1e-6; smaller, more steps are made. Pinned
-/// by `family_08_primitives_at_contact`, seed 934.
-pub(super) const ALIGNED: f64 = 1e-7;
 
 /// Least distance of the points that a step is made for, relative to the smaller body: nearer, the
 /// turn of their difference is lost in rounding. Double-double arithmetic goes on from there, so
@@ -137,7 +129,7 @@ impl WithSimd for EdgeQuery<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let Self { a, pose_a, b, pose_b, goal, tolerance, options, start, trace } = self;
-        let relation = Apart { pose_a, pose_b, goal, tolerance, angle: ALIGNED, facing: None };
+        let relation = Apart { pose_a, pose_b, goal, tolerance, angle: ALIGNED_AT_EDGES, facing: None };
         let relative = relation.relative(simd, a, b);
         let sides = (Side::at_home(simd, a, 0), Side::away(simd, b, 0, &relative));
         let solver = Solver { sides, relation, options, limits: limits(a, b) };

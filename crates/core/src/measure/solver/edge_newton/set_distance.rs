@@ -15,7 +15,7 @@
 //! Proofs are those of [`super`], with the set's support function in place of a second body.
 
 use super::aggregate::{Evaluated, Weighted};
-use super::distance::{ALIGNED, FLATTEST, VIOLATED, tangent_of_angle};
+use super::distance::{FLATTEST, VIOLATED, tangent_of_angle};
 use super::linearized::Linearized;
 use super::quadratic_program::minimize;
 use super::share_inside::share_inside;
@@ -33,8 +33,8 @@ use crate::measure::solver::exact_shape::{
 use crate::measure::solver::stages::{Stage, runs};
 use crate::measure::solver::stop_criterion::StopCriterion;
 use crate::measure::solver::tangent_newton::{
-    AT_REST_SQUARED, FEATURES, LONGEST_MOVE, LONGEST_STEP, PATIENCE, RETREATS, Relative, SEEK_ROUNDS, Side,
-    TAYLOR_ROUNDING, WORTH_A_BRACKET, moved,
+    ALIGNED_AT_EDGES, AT_REST_SQUARED, FEATURES, LONGEST_MOVE, LONGEST_STEP, PATIENCE, RETREATS, Relative, SEEK_ROUNDS,
+    Side, TAYLOR_ROUNDING, WORTH_A_BRACKET, moved,
 };
 use crate::polynomial::{Simd, WithSimd};
 use nalgebra::Vector3;
@@ -455,7 +455,7 @@ impl<P: Projectable> EdgeShapePair<'_, P> {
         let off = subtract::<S, f64>(outward, found.next.frame[2]);
         let off = dot::<S, f64>(off, off).sqrt() + there.gradient_error * multiplier;
         let off = off.max(tangent_of_angle(simd, n, between));
-        let narrow = upper - lower <= self.tolerance && off <= ALIGNED;
+        let narrow = upper - lower <= self.tolerance && off <= ALIGNED_AT_EDGES;
         if !(lower > 0.0 && lower <= upper && (narrow || self.goal.met(lower, upper))) {
             return None;
         }

@@ -29,7 +29,7 @@ use crate::measure::solver::equality_program;
 use crate::measure::solver::kkt_newton::{Active, VIOLATED};
 use crate::measure::solver::linear_systems::solve_equilibrated;
 use crate::measure::solver::projection::Single;
-use crate::measure::solver::tangent_newton::ALIGNED;
+use crate::measure::solver::tangent_newton::{ALIGNED, aligned_angle};
 use nalgebra::{Matrix3, Vector3};
 
 /// Most Newton steps: from where doubles end a few double the digits.
@@ -114,11 +114,10 @@ impl<'a> RefinedAxis<'a> {
         let steps = self.run(near, options.max_iterations(), |found| {
             lower = lower.max(found.lower);
             let own = found.upper - found.lower;
-            // The upper bound stays the one that the points of the answer attain.
+            // The upper bound stays the one that the points of the answer attain, also where a point
+            // from which nothing is proven to be apart is nearer.
             if own.is_finite() && own <= width {
                 (width, upper, at) = (own, found.upper, Some(*found));
-            } else if width == f64::INFINITY {
-                upper = upper.min(found.upper);
             }
             upper - lower <= tolerance && found.aligned || options.stopped()
         });
@@ -211,10 +210,11 @@ impl<'a> RefinedAxis<'a> {
         let way = self.pull(&point);
         let upper = in_metres(dot(&way, &way).sqrt() + slack(&point)).next_up();
 
+        let angle = aligned_angle(&[self.body.posed.body]);
         let n = times(&n, Two::from(1.0) / length);
         let across = minus(&way, &times(&n, dot(&n, &way)));
         // What carries next to nothing of the normal does not turn it, whether it is met or not.
-        let missed = doubles(&across).norm() + active.gap(&at, &values, ALIGNED * length.double());
+        let missed = doubles(&across).norm() + active.gap(&at, &values, angle * length.double());
         RefinedOffset {
             lower,
             upper: if inside.is_some() && !upper.is_nan() { upper } else { f64::INFINITY },
@@ -222,7 +222,7 @@ impl<'a> RefinedAxis<'a> {
             place: self.place(&point).double(),
             n: doubles(&n),
             // Far away the place counts, not the angle.
-            aligned: missed <= ALIGNED * doubles(&way).norm().min(self.body.posed.radius),
+            aligned: missed <= angle * doubles(&way).norm().min(self.body.posed.radius),
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::measure::solver::kkt_newton::{Active, DistanceNewton, VIOLATED};
 use crate::measure::solver::kkt_system::{DistanceSystem, Residuals};
 use crate::measure::solver::level_newton::LevelNewton;
 use crate::measure::solver::linear_systems::solve_equilibrated;
-use crate::measure::solver::tangent_newton::ALIGNED;
+use crate::measure::solver::tangent_newton::{ALIGNED, aligned_angle};
 use nalgebra::Vector3;
 
 /// Most Newton steps: tips that are flat of order eight take a dozen for each digit.
@@ -35,7 +35,7 @@ pub(in crate::measure) struct RefinedDistance {
     pub(in crate::measure) x: Vector3<f64>,
     pub(in crate::measure) y: Vector3<f64>,
     pub(in crate::measure) n: Vector3<f64>,
-    /// Whether n is the normal of the solution, to [`ALIGNED`].
+    /// Whether n is the normal of the solution, to [`aligned_angle`].
     pub(in crate::measure) aligned: bool,
     pub(in crate::measure) active: (Active, Active),
 }
@@ -157,7 +157,8 @@ impl<'a> RefinedPair<'a> {
         let apart = minus(&p, &q);
         let across = minus(&times(&apart, length), &times(&n, dot(&n, &apart) / length));
         let missed = doubles(&across).norm() + of_a.gap(&a, &values_a, 0.0) + of_b.gap(&b, &values_b, 0.0);
-        let opposite = doubles(&plus(&sum_a, &sum_b)).norm() <= ALIGNED;
+        let angle = aligned_angle(&[self.a.posed.body, self.b.posed.body]);
+        let opposite = doubles(&plus(&sum_a, &sum_b)).norm() <= angle;
         RefinedDistance {
             // Not `max`: a NaN bounds nothing.
             lower: if lower > 0.0 { lower } else { 0.0 },
@@ -165,7 +166,7 @@ impl<'a> RefinedPair<'a> {
             x: doubles(&p),
             y: doubles(&q),
             n: doubles(&n) / length.double(),
-            aligned: opposite && missed <= ALIGNED * doubles(&apart).norm(),
+            aligned: opposite && missed <= angle * doubles(&apart).norm(),
             active: (of_a.set, of_b.set),
         }
     }

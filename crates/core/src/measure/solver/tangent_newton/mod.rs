@@ -36,7 +36,9 @@ pub(in crate::measure) use limits::{
 };
 pub(in crate::measure) use plane::Plane;
 pub(in crate::measure) use simd_body::{Relative, Side};
-pub(in crate::measure) use taylor_bounds::{ALIGNED, Bracket, Extrapolated, NUDGE, TAYLOR_ROUNDING, bracket};
+pub(in crate::measure) use taylor_bounds::{
+    ALIGNED, ALIGNED_AT_EDGES, Bracket, Extrapolated, NUDGE, TAYLOR_ROUNDING, aligned_angle, bracket,
+};
 
 /// Second derivatives of a constraint at a point.
 #[derive(Clone, Copy, Debug)]

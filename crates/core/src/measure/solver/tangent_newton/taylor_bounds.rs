@@ -3,6 +3,7 @@
 
 use super::plane::Plane;
 use super::simd_body::Side;
+use crate::body::Body;
 use crate::measure::frames::pose::RELATIVE_QUATERNION_ERROR;
 use crate::measure::frames::vector::{M3, V3, add_scaled, apply_symmetric, apply_transposed, dot, scaled, subtract};
 use crate::polynomial::{NEAR_LEVEL, Number, NumberJet, Simd, gamma};
@@ -184,6 +185,19 @@ pub(in crate::measure) const TAYLOR_ROUNDING: f64 = 128.0 * f64::EPSILON;
 /// Larger, gradients are off by more; smaller, more answers are refined. Pinned by
 /// `family_20_distance_gradients` of the stability tests.
 pub(in crate::measure) const ALIGNED: f64 = 2.5e-7;
+
+/// The same between bodies of which one has edges: these may be flatter than smooth ones, and near
+/// contact an angle stands for a longer way along the sides.
+///
+/// Larger, gradients near contact are off by more than 1e-6; smaller, more steps are made and more
+/// answers refined. Pinned by `family_08_primitives_at_contact`, seed 934.
+pub(in crate::measure) const ALIGNED_AT_EDGES: f64 = 1e-7;
+
+/// Largest angle between the normals of the bodies of an answer, or of one and a shape, radians,
+/// that it is taken at.
+pub(in crate::measure) fn aligned_angle(bodies: &[&Body]) -> f64 {
+    if bodies.iter().all(|body| body.is_smooth()) { ALIGNED } else { ALIGNED_AT_EDGES }
+}
 
 /// How much farther a point is moved than its constraint's linearization requires, dimensionless,
 /// for the rounding of its gradient.
