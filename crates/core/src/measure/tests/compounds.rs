@@ -373,11 +373,11 @@ fn few_of_many_parts_are_touched() {
 fn balls_move_no_farther_than_their_bound() {
     for seed in 0..2000 {
         let mut random = Seeded(18_500 + seed);
-        let offset = 10_f64.powf(random.between(-3.0, 6.0));
+        let offset = 10_f64.powf(1.5 + 4.5 * random.signed());
         let (pose_a, far) = (random_pose(&mut random, 1.0), random.unit() * offset);
         let before = random_pose(&mut random, 0.0).with_translation(pose_a.translation() + far);
-        let angle = 10_f64.powf(random.between(-9.0, 0.49));
-        let step = random.unit() * 10_f64.powf(random.between(-9.0, 1.0));
+        let angle = 10_f64.powf(-4.25 + 4.74 * random.signed());
+        let step = random.unit() * 10_f64.powf(-4.0 + 5.0 * random.signed());
         let turn = UnitQuaternion::from_scaled_axis(random.unit() * angle);
         let turned = (turn * before.rotation()).coords;
         let after =
