@@ -205,7 +205,8 @@ impl PairCache {
         let uses = &USES[position % USES.len()];
         let mut entry = match self.entry(position).try_lock() {
             Ok(entry) => entry,
-            // A panic elsewhere left a hint, which may be anything.
+            // A panic elsewhere left a hint, which may be anything. What is proven of other parts
+            // names its solids and pair, and is written whole.
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => {
                 uses.misses.fetch_add(1, Ordering::Relaxed);

@@ -33,8 +33,8 @@ impl Recalled {
     pub(super) const NOTHING: Self = Self { lower: f64::NEG_INFINITY, margin: 0.0 };
 }
 
-/// How much farther than the nearest pair others are to be proven: relative to the motion since the
-/// last proof, and at most relative to the smaller solid.
+/// How much farther than the nearest pair others are to be proven: relative to the motion since
+/// the last proof, and at most relative to the smaller solid.
 ///
 /// Larger, more pairs are searched at once; smaller, all are looked at again sooner. It changes time
 /// only; `other_parts_are_left_out_along_motions` counts what is spared.

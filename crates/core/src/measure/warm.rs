@@ -108,9 +108,3 @@ impl Hint {
         }
     }
 }
-
-impl From<Hint> for WarmStart {
-    fn from(hint: Hint) -> Self {
-        Self { hint, ..Self::default() }
-    }
-}

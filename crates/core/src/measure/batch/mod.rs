@@ -224,7 +224,7 @@ impl WithSimd for Batch<'_> {
 
 /// A start that says whether Newton's method in lanes has diverged, as it would from there again.
 fn cold_start(diverged: bool) -> WarmStart {
-    if diverged { Hint::Diverged.into() } else { WarmStart::default() }
+    WarmStart { hint: if diverged { Hint::Diverged } else { Hint::Cold }, ..WarmStart::default() }
 }
 
 impl Rounds for Batch<'_> {

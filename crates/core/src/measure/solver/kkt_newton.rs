@@ -378,8 +378,8 @@ impl DistanceNewton {
     }
 
     /// Whether the normal is that of the solution, to [`aligned_angle`] or to what rounding leaves
-    /// of so short a distance. The narrowest of brackets determines it to about the root of its width
-    /// relative to the distance; the equations determine it fully: n is along x - y and what the
+    /// of so short a distance. The narrowest of brackets determines it to about the root of its
+    /// width relative to the distance; the equations determine it fully: n is along x - y and what the
     /// constraints of each body carry, none of them is violated, and those with a multiplier above
     /// 0 are met with equality.
     pub(in crate::measure) fn is_aligned(&self, pair: &Pair<'_>) -> bool {

@@ -64,8 +64,7 @@ fn the_closest_parts_count() {
     }
 }
 
-/// Of 64 pairs of elongated parts in each other's midst balls and planes leave few to be searched,
-/// so that hints for the nearest one are enough.
+/// Of 64 pairs of elongated parts in each other's midst balls and planes leave few to be searched.
 #[test]
 fn few_pairs_of_many_parts_are_searched() {
     let (mut searched, mut queries) = (0, 0);

@@ -326,7 +326,7 @@ impl<const N: usize> Sweep<'_, N> {
         true
     }
 
-    /// The directions along which the bodies are least deep: of all, and of those far from the best.
+    /// Along which direction the bodies are least deep: of all, and of those far from the best.
     fn shallowest(&self, best: &Best<'_>) -> [Option<usize>; 2] {
         let directions = self.covering.directions();
         let least = |far: &dyn Fn(&Direction) -> bool| {

@@ -114,8 +114,8 @@ impl<'a> RefinedAxis<'a> {
         let steps = self.run(near, options.max_iterations(), |found| {
             lower = lower.max(found.lower);
             let own = found.upper - found.lower;
-            // The upper bound stays the one that the points of the answer attain, also where a point
-            // from which nothing is proven to be apart is nearer.
+            // The upper bound stays the one that the points of the answer attain, also where a
+            // point that proves no lower bound is nearer.
             if own.is_finite() && own <= width {
                 (width, upper, at) = (own, found.upper, Some(*found));
             }
